@@ -239,7 +239,7 @@ Command add_measure(CommandLine& app) {
           ->type_name("N");
   app.add_option("--informed-count", o->informed_count,
                  "Views to read by informed detection as well, 0 to 100000; takes up to a second per view "
-                 "and distortion, some 3 s where the view does not agree with the field; default: 20, or 0 "
+                 "and distortion, some 4 s where the view does not agree with the field; default: 20, or 0 "
                  "for marks without cells")
       ->range(0, 100000)
       ->type_name("N")

@@ -1,6 +1,9 @@
+#include <fieldmark/distort/distortion.h>
 #include <fieldmark/engine/parallel.h>
+#include <fieldmark/imaging/image.h>
 #include <fieldmark/watermark/scanning/object_search.h>
 
+#include <array>
 #include <cmath>
 
 #include "support/catch.h"
@@ -90,8 +93,13 @@ TEST_CASE("object_search: gain, offset and the number of threads change nothing 
     const ScopedThreads one(1);
     const auto again = ObjectSearch(owner, kFewViews).find(image, {2}, {2});
     REQUIRE(again.size() == 4);
-    CHECK(again[0].likeness == as_it_is[0].likeness);
-    CHECK(again[1].camera.pose == as_it_is[1].camera.pose);
+    for (std::size_t i = 0; i < 4; ++i) {
+      CHECK(again[i].likeness == as_it_is[i].likeness);
+      CHECK(again[i].camera.pose == as_it_is[i].camera.pose);
+      CHECK(again[i].window.x == as_it_is[i].window.x);
+      CHECK(again[i].window.width == as_it_is[i].window.width);
+      CHECK(again[i].whole == as_it_is[i].whole);
+    }
   }
   for (Index i = 0; i < image.size(); ++i) image[i] = 0.6f * image[i] + 0.2f;
   const auto faded = search.find(image, {1}, {1});
@@ -114,6 +122,53 @@ TEST_CASE("object_search: places are as large as is wanted, and as many") {
   CHECK(search.find(image, {3, 1000}, {3, 1000}).empty());
 }
 
+namespace {
+
+// Returns the overlap of two windows as a share of their union.
+double overlap(const Window& a, const Window& b) {
+  const double across = std::min(a.x + a.width, b.x + b.width) - std::max(a.x, b.x),
+               down = std::min(a.y + a.height, b.y + b.height) - std::max(a.y, b.y);
+  if (across <= 0 || down <= 0) return 0;
+  return across * down / (a.width * a.height + b.width * b.height - across * down);
+}
+
+struct Quarter {
+  Tensor<float> image;
+  Window window;  // around it
+};
+
+// Returns a quarter of the object in a novel view, before shapes.
+Quarter quarter_before_shapes(std::uint64_t seed) {
+  const auto camera = nerf::make_cameras(tiny_field().cameras, nerf::CameraSet::novel, 1, 200, seed).front();
+  nerf::Renderer renderer(tiny_field());
+  const float level = nerf::background_value(tiny_field().background);
+  distort::PixelMap source;
+  Quarter quarter{
+      distort::apply_distortion(distort::parse_distortion("part_0.8"), quantize8(renderer.render(camera).rgb),
+                                CounterRng(1, 1), seed, std::array{level, level, level}, &source),
+      {}};
+  const distort::PixelMap to = source.inverse();
+  const auto first = to(source.kept[0], source.kept[1]), last = to(source.kept[2], source.kept[3]);
+  quarter.window = {first[0] + 0.5, first[1] + 0.5, last[0] - first[0], last[1] - first[1]};
+  return quarter;
+}
+
+}  // namespace
+
+TEST_CASE("object_search: a quarter of the object's pixels is found before shapes") {
+  const Owner owner = tiny_owner();
+  const ObjectSearch search(owner, {.views = 120});
+  Index found = 0;
+  for (const std::uint64_t seed : {1u, 2u, 3u, 4u, 5u, 6u}) {
+    const Quarter quarter = quarter_before_shapes(seed);
+    double most = 0;
+    for (const ObjectPlace& place : search.find(quarter.image, {0}, {10, 30}))
+      most = std::max(most, overlap(place.window, quarter.window));
+    found += most > 0.5;
+  }
+  CHECK(found >= 4);
+}
+
 TEST_CASE("object_search: a plain image looks like nothing") {
   const Owner owner = tiny_owner();
   CHECK(ObjectSearch(owner, kFewViews).find(Tensor<float>({64, 64, 3}, 0.4f), {4}, {4}).empty());
@@ -124,6 +179,8 @@ TEST_CASE("object_search: errors name what is wrong") {
   CHECK_THROWS_WITH(ObjectSearch(owner, {.views = 0}),
                     "[object_search] views and size must be at least 1 and 24, got 0 and 96");
   const ObjectSearch search(owner, {.views = 1, .size = 48});
+  CHECK_THROWS_WITH(search.find(Tensor<float>({64, 64, 3}), {1}, {1, -2}),
+                    "[object_search] count and least must be at least 0, got 1 and -2");
   CHECK_THROWS_AS(search.find(Tensor<float>({64, 64}), {1}, {1}), ShapeError);
   CHECK_THROWS_AS(search.find(Tensor<float>({15, 64, 3}), {1}, {1}), ShapeError);
 }

@@ -5,8 +5,8 @@
 #include "outline_match.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <utility>
@@ -18,8 +18,8 @@ namespace {
 // one for the best of them.
 constexpr Index kCoarseWhole = 16, kCoarseQuarter = 12, kFine = 24;
 constexpr Index kLeastCoarse = 24, kLeastFine = 60;  // pixels inside an outline: fewer look like anything
-// Longer side of an object as a share of the image's: so many sizes from the smallest one, each a step
-// larger. A quarter is half as long. There are kFinePerSize fine sizes to a step.
+// Sizes: the longer side of an object as a share of the image's. The smallest is kSmallest, and each is kStep
+// times the one before, with kFinePerSize fine sizes to a step. Quarters count half.
 constexpr double kSmallest = 0.2;
 constexpr Index kSizes = 8, kFinePerSize = 3;
 constexpr double kStep = 1.25;
@@ -28,13 +28,19 @@ constexpr Index kShift = 3;  // pixels of the fine grid that a place may move
 constexpr std::size_t kRefinedWholes = 64,
                       kRefinedQuarters = 512;  // best coarse places that are compared finely
 
-// Returns the smallest window around all pixels inside the outline; empty if there are none.
-Window outline_window(const Tensor<float>& opacity) {
+bool holds(const Window& window, Index x, Index y) {
+  const auto right = static_cast<double>(x), down = static_cast<double>(y);
+  return right >= window.x && right < window.x + window.width && down >= window.y &&
+         down < window.y + window.height;
+}
+
+// Returns the smallest window around all pixels of a window inside the outline; empty if there are none.
+Window outline_window(const Tensor<float>& opacity, const Window& within) {
   const Index h = opacity.shape[0], w = opacity.shape[1];
   Index left = w, right = 0, top = h, bottom = 0;
   for (Index y = 0; y < h; ++y)
     for (Index x = 0; x < w; ++x) {
-      if (!(opacity[y * w + x] >= 0.5f)) continue;
+      if (!holds(within, x, y) || !(opacity[y * w + x] >= 0.5f)) continue;
       left = std::min(left, x), right = std::max(right, x + 1);
       top = std::min(top, y), bottom = std::max(bottom, y + 1);
     }
@@ -49,9 +55,7 @@ double middle(const Tensor<float>& opacity, const Window& window, bool row) {
   std::vector<double> lines(at(opacity.shape[row ? 0 : 1]));
   double all = 0, sum = 0;
   for (Index p = 0; p < opacity.size(); ++p) {
-    const auto x = static_cast<double>(p % w), y = static_cast<double>(p / w);
-    if (x < window.x || x >= window.x + window.width || y < window.y || y >= window.y + window.height)
-      continue;
+    if (!holds(window, p % w, p / w)) continue;
     lines[at(row ? p / w : p % w)] += static_cast<double>(opacity[p]);
     all += static_cast<double>(opacity[p]);
   }
@@ -62,21 +66,31 @@ double middle(const Tensor<float>& opacity, const Window& window, bool row) {
   return static_cast<double>(lines.size());
 }
 
-// Returns windows around quarters: those of the object's window, and those with a quarter of its pixels each.
+// Returns windows around eight quarters, without margins: those of the object's window, and those with a
+// quarter of its pixels each.
 std::vector<Window> quarters_of(const Tensor<float>& opacity, const Window& all) {
-  std::vector<Window> out;
-  for (const double down : {0., 0.5})
-    for (const double right : {0., 0.5})
-      out.push_back({all.x + right * all.width, all.y + down * all.height, all.width / 2, all.height / 2});
-  const double row = middle(opacity, all, true);
-  for (Window half : {Window{all.x, all.y, all.width, row - all.y},
-                      Window{all.x, row, all.width, all.y + all.height - row}}) {
-    const double column = middle(opacity, half, false);
-    for (const Window& quarter : {Window{half.x, half.y, column - half.x, half.height},
-                                  Window{column, half.y, half.x + half.width - column, half.height}})
-      if (quarter.width >= 1 && quarter.height >= 1) out.push_back(quarter);
-  }
+  const auto split = [&](double row, auto column_of) {
+    std::vector<Window> out;
+    for (const Window& half : {Window{all.x, all.y, all.width, row - all.y},
+                               Window{all.x, row, all.width, all.y + all.height - row}}) {
+      const double column = column_of(half);
+      out.push_back({half.x, half.y, column - half.x, half.height});
+      out.push_back({column, half.y, half.x + half.width - column, half.height});
+    }
+    return out;
+  };
+  std::vector<Window> out =
+      split(all.y + all.height / 2, [&](const Window&) { return all.x + all.width / 2; });
+  for (const Window& quarter :
+       split(middle(opacity, all, true), [&](const Window& half) { return middle(opacity, half, false); }))
+    out.push_back(quarter);
+  for (Window& quarter : out) quarter = outline_window(opacity, quarter);
+  std::erase_if(out, [](const Window& quarter) { return !(quarter.width > 0); });
   return out;
+}
+
+Window whole_window(const Tensor<float>& image) {
+  return {0, 0, static_cast<double>(image.shape[1]), static_cast<double>(image.shape[0])};
 }
 
 Tensor<float> in_all_channels(const Tensor<float>& opacity) {
@@ -85,7 +99,7 @@ Tensor<float> in_all_channels(const Tensor<float>& opacity) {
   return out;
 }
 
-Window window_of(const OutlineMatch& match, const Outline& outline, const ReducedImage& image) {
+Window window_of(const OutlineMatch& match, const Outline& outline, const ResizedImage& image) {
   return {static_cast<double>(match.column) / image.zoom_x, static_cast<double>(match.row) / image.zoom_y,
           static_cast<double>(outline.width) / image.zoom_x,
           static_cast<double>(outline.height) / image.zoom_y};
@@ -107,36 +121,36 @@ struct ObjectSearch::Found {
   Index size = 0;  // of the coarse grid
   Window window{};
   double likeness = -1;
-  void take(const OutlineMatch& match, const Outline& outline, const ReducedImage& image, Index at_size) {
+  void take(const OutlineMatch& match, const Outline& outline, const ResizedImage& image, Index at_size) {
     if (!(match.likeness > likeness)) return;
     *this = {part, at_size, window_of(match, outline, image), match.likeness};
   }
 };
 
-// The image at all sizes for one kind of part.
+// The image at all sizes for one kind of part, whose longer side must have `least` pixels.
 class ObjectSearch::Sizes {
  public:
-  Sizes(const Tensor<float>& rgb, bool whole, Index least) {
+  Sizes(const Tensor<float>& rgb, bool whole, Index least) : least_(static_cast<double>(least)) {
     const double longer = static_cast<double>(std::max(rgb.shape[0], rgb.shape[1])) / (whole ? 1 : 2);
     const auto grid = static_cast<double>(whole ? kCoarseWhole : kCoarseQuarter);
-    while (std::ssize(coarse_) < kSizes) {
-      const Index fine = kFinePerSize * std::ssize(coarse_);
-      const double zoom = grid / (size_of(fine) * longer);
-      const bool too_small = zoom > 1 || size_of(fine + kReach) * longer < static_cast<double>(least);
-      too_small_ += too_small;
-      coarse_.push_back(too_small ? ReducedImage{} : reduced_image(rgb, zoom));
+    const auto resized = [&](bool used, double zoom) {
+      return used ? resized_image(rgb, zoom) : ResizedImage{};
+    };
+    for (Index i = 0; i < kSizes; ++i) {
+      const double zoom = grid / (size_of(kFinePerSize * i) * longer);
+      const bool used = zoom <= 1 && size_of(kFinePerSize * i + kReach) * longer >= least_;
+      first_ += !used;
+      coarse_.push_back(resized(used, zoom));
     }
-    for (Index i = -kReach; i < kFinePerSize * kSizes + kReach; ++i) {
-      const bool used = i + kReach >= kFinePerSize * too_small_;
-      fine_.push_back(used ? reduced_image(rgb, static_cast<double>(kFine) / (size_of(i) * longer))
-                           : ReducedImage{});
-    }
+    for (Index i = -kReach; i <= kFinePerSize * (kSizes - 1) + kReach; ++i)
+      fine_.push_back(resized(first_ < kSizes && i + kReach >= kFinePerSize * first_,
+                              static_cast<double>(kFine) / (size_of(i) * longer)));
   }
 
   // Returns the best place among all of all sizes.
   Found coarse(const Part& part, std::size_t index) const {
     Found found{index};
-    for (Index i = too_small_; i < kSizes; ++i)
+    for (Index i = first_; i < kSizes; ++i)
       found.take(best_match(part.coarse, coarse_[at(i)]), part.coarse, coarse_[at(i)], i);
     return found;
   }
@@ -146,7 +160,9 @@ class ObjectSearch::Sizes {
     Found found{coarse.part};
     const Window& w = coarse.window;
     for (Index i = 0; i <= 2 * kReach; ++i) {
-      const ReducedImage& image = fine_[at(kFinePerSize * coarse.size + i)];
+      const ResizedImage& image = fine_[at(kFinePerSize * coarse.size + i)];
+      const Window size = window_of({}, part.fine, image);
+      if (std::max(size.width, size.height) < least_) continue;
       const auto start = [](double middle, double zoom, Index length) {
         return std::lround(middle * zoom - static_cast<double>(length) / 2);
       };
@@ -161,8 +177,9 @@ class ObjectSearch::Sizes {
   static double size_of(Index fine) {
     return kSmallest * std::pow(kStep, static_cast<double>(fine) / static_cast<double>(kFinePerSize));
   }
-  std::vector<ReducedImage> coarse_, fine_;
-  Index too_small_ = 0;  // sizes at which the grid is finer than the image, or parts have too few pixels
+  double least_;
+  std::vector<ResizedImage> coarse_, fine_;
+  Index first_ = 0;  // size from which on the image is no smaller than the grid, and parts than `least`
 };
 
 void ObjectSearch::check(const ObjectSearchOptions& options) {
@@ -181,7 +198,7 @@ ObjectSearch::ObjectSearch(const Owner& owner, const ObjectSearchOptions& option
   for (std::size_t v = 0; v < cameras_.size(); ++v) {
     const nerf::Rendering view = renderer.render(cameras_[v]);
     const Tensor<float> opacity = in_all_channels(view.opacity);
-    const Window all = outline_window(view.opacity);
+    const Window all = outline_window(view.opacity, whole_window(view.opacity));
     if (!(all.width > 0)) continue;
     add_part(v, view.rgb, opacity, all, true);
     for (const Window& quarter : quarters_of(view.opacity, all))
@@ -202,23 +219,19 @@ void ObjectSearch::add_part(std::size_t view, const Tensor<float>& rgb, const Te
 std::vector<ObjectSearch::Found> ObjectSearch::found(const Tensor<float>& rgb, bool whole,
                                                      Index least) const {
   const Sizes sizes(rgb, whole, least);
-  const auto by_likeness = [](const Found& a, const Found& b) { return a.likeness > b.likeness; };
   std::vector<Found> all;
   for (std::size_t i = 0; i < parts_.size(); ++i)
     if (parts_[i].whole == whole) all.push_back({i});
-  const auto each = [&](auto find) {
+  const auto each = [&](auto better) {
     parallel_for(std::ssize(all), 4, [&](Index begin, Index end) {
-      for (Index i = begin; i < end; ++i) all[at(i)] = find(parts_[all[at(i)].part], all[at(i)]);
+      for (Index i = begin; i < end; ++i) all[at(i)] = better(parts_[all[at(i)].part], all[at(i)]);
     });
     std::erase_if(all, [](const Found& f) { return !(f.likeness > 0); });
-    std::ranges::stable_sort(all, by_likeness);
+    std::ranges::stable_sort(all, [](const Found& a, const Found& b) { return a.likeness > b.likeness; });
   };
-  each([&](const Part& part, const Found& at) { return sizes.coarse(part, at.part); });
+  each([&](const Part& part, const Found& f) { return sizes.coarse(part, f.part); });
   all.resize(std::min(all.size(), whole ? kRefinedWholes : kRefinedQuarters));
-  each([&](const Part& part, const Found& at) { return sizes.fine(part, at); });
-  std::erase_if(all, [&](const Found& f) {
-    return std::max(f.window.width, f.window.height) < static_cast<double>(least);
-  });
+  each([&](const Part& part, const Found& f) { return sizes.fine(part, f); });
   return all;
 }
 
@@ -231,15 +244,18 @@ std::vector<ObjectPlace> ObjectSearch::find(const Tensor<float>& rgb, const Want
     throw ShapeError("[object_search] rgb must have sides of at least 16, got shape " + rgb.shape.str());
   std::vector<ObjectPlace> best;
   for (const bool whole : {true, false}) {
+    const auto& [count, least] = whole ? wholes : quarters;
+    if (count < 0 || least < 0)
+      throw ValueError("[object_search] count and least must be at least 0, got " + std::to_string(count) +
+                       " and " + std::to_string(least));
+    if (count == 0) continue;
     std::vector<std::uint8_t> used(cameras_.size());
-    const Wanted& wanted = whole ? wholes : quarters;
-    Index left = wanted.count;
-    for (const Found& f : found(rgb, whole, wanted.least)) {
+    Index left = count;
+    for (const Found& f : found(rgb, whole, least)) {
       const Part& part = parts_[f.part];
-      if (left == 0) break;
       if (std::exchange(used[part.view], 1)) continue;
-      --left;
       best.push_back({camera_at(part, f.window, h, w), f.window, whole, f.likeness});
+      if (--left == 0) break;
     }
   }
   return best;

@@ -17,7 +17,7 @@ struct RowSums {
   std::vector<float> product, square;
   std::array<std::vector<float>, 3> mean;
 
-  void add(const Outline& outline, const ReducedImage& image, Index row, Index first) {
+  void add(const Outline& outline, const ResizedImage& image, Index row, Index first) {
     for (std::size_t k = 0; k < outline.x.size(); ++k) {
       const Index from = (row + outline.y[k]) * image.width + first + outline.x[k];
       const float* squares = image.squares.data() + from;
@@ -36,7 +36,7 @@ struct RowSums {
 };
 
 // Compares the outline with the places [first, last] of a row.
-void match_row(const Outline& outline, const ReducedImage& image, Index row, Index first, Index last,
+void match_row(const Outline& outline, const ResizedImage& image, Index row, Index first, Index last,
                OutlineMatch& best) {
   const auto n = static_cast<float>(outline.x.size());
   RowSums sums(static_cast<std::size_t>(last - first + 1));
@@ -50,7 +50,7 @@ void match_row(const Outline& outline, const ReducedImage& image, Index row, Ind
   }
 }
 
-OutlineMatch best_within(const Outline& outline, const ReducedImage& image, Index top, Index bottom,
+OutlineMatch best_within(const Outline& outline, const ResizedImage& image, Index top, Index bottom,
                          Index left, Index right) {
   OutlineMatch best;
   top = std::max<Index>(0, top), left = std::max<Index>(0, left);
@@ -91,13 +91,14 @@ std::optional<Outline> outline_of(const Tensor<float>& rgb, const Tensor<float>&
   return out;
 }
 
-ReducedImage reduced_image(const Tensor<float>& rgb, double zoom) {
+ResizedImage resized_image(const Tensor<float>& rgb, double zoom) {
   const Index h = rgb.shape[0], w = rgb.shape[1];
   const auto side = [&](Index length) {
     return std::max<Index>(1, std::lround(zoom * static_cast<double>(length)));
   };
-  const Tensor<float> small = resize_area(rgb, side(h), side(w));
-  ReducedImage out{small.shape[0],
+  const Tensor<float> small =
+      zoom > 1 ? resize_bilinear(rgb, side(h), side(w)) : resize_area(rgb, side(h), side(w));
+  ResizedImage out{small.shape[0],
                    small.shape[1],
                    static_cast<double>(small.shape[1]) / static_cast<double>(w),
                    static_cast<double>(small.shape[0]) / static_cast<double>(h),
@@ -114,11 +115,11 @@ ReducedImage reduced_image(const Tensor<float>& rgb, double zoom) {
   return out;
 }
 
-OutlineMatch best_match(const Outline& outline, const ReducedImage& image) {
+OutlineMatch best_match(const Outline& outline, const ResizedImage& image) {
   return best_within(outline, image, 0, image.height, 0, image.width);
 }
 
-OutlineMatch best_match_near(const Outline& outline, const ReducedImage& image, Index row, Index column,
+OutlineMatch best_match_near(const Outline& outline, const ResizedImage& image, Index row, Index column,
                              Index reach) {
   return best_within(outline, image, row - reach, row + reach, column - reach, column + reach);
 }

@@ -19,7 +19,7 @@ constexpr Index kLeastReduced = 16;    // shorter side of the same image, and of
 // Longer side of a part that is read, pixels; below kSmallPart it shows little of the mark, and a larger part
 // replaces it.
 constexpr Index kLeastPart = 48, kSmallPart = 60;
-// Places that are tried. A whole object of 40 pixels has kLeastPart with its margins.
+// Places that are tried. With its margins, a square object of 40 pixels has kLeastPart.
 constexpr ObjectSearch::Wanted kWholes{24, 40}, kQuarters{64, kLeastPart};
 // Agreement at which an object counts as found. In images of something else, places of an object stay below
 // 0.65, and quarters of 63 pixels below 0.8; smaller ones reach 0.87.

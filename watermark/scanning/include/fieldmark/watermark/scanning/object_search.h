@@ -22,10 +22,11 @@ struct ObjectSearchOptions {
   std::uint64_t seed = 0;  ///< of the cameras
 };
 
-/// Finds an object, or a quarter of it, before any background. Renders of the field, cut out along their
-/// outlines, are compared with every place of the image at eight sizes. The best places are compared again on
-/// a finer grid, at five sizes and 49 places around each. The likeness of a part T with the image I, over the
-/// n pixels of the part's outline and all channels c:
+/// Finds an object, or a quarter of it, before any background. Renders of the field are cut out along their
+/// outlines, whole and in eight quarters: four divide the object's window equally, four its pixels. Each part
+/// is compared with every place of the image at eight sizes, on a coarse grid. The best 64 wholes and 512
+/// quarters are compared again on a fine grid, at five sizes and 49 places around each. The likeness of a
+/// part T with the image I, over the n pixels of the part's outline and all channels c:
 ///   sum (T_c - mean T_c) I_c / sqrt(sum (T_c - mean T_c)^2 sum (I_c - mean I_c)^2)
 /// so a gain and an offset do not count. The search knows neither key nor message. It finds upright objects
 /// alone.
@@ -39,12 +40,13 @@ class ObjectSearch {
   static void check(const ObjectSearchOptions& options);
   /// Places of one kind to return.
   struct Wanted {
-    Index count = 0;  ///< most places
-    Index least = 0;  ///< longer side of the smallest one, pixels
+    Index count = 0;  ///< most places, at least 0
+    Index least = 0;  ///< longer side of the smallest one, pixels, at least 0
   };
-  /// Returns places of the whole object, then of quarters, the likeliest of each first and from another view.
-  /// They do not depend on the number of threads.
+  /// Returns places of the whole object, then of quarters, each kind by falling likeness. A view appears at
+  /// most once per kind. They do not depend on the number of threads.
   /// @param rgb  [H, W, 3], sides of at least 16   @throws ShapeError for another shape
+  /// @throws ValueError if a count or a side is negative
   std::vector<ObjectPlace> find(const Tensor<float>& rgb, const Wanted& wholes, const Wanted& quarters) const;
 
  private:
