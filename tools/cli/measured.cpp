@@ -68,7 +68,7 @@ void print_measurement(std::ostream& out, const watermark::Measurement& m, const
   print("bit accuracy, blind  %.2f%% per view, 5th percentile %.2f%%, %.3f s per view\n",
         100 * m.accuracy.blind, 100 * m.accuracy_p5, m.blind_seconds);
   if (m.informed_views > 0)
-    print("informed             %.2f%%, chosen %.2f%%, of %lld views, %.1f s per view\n",
+    print("informed             %.2f%%, chosen %.2f%%, of %lld views, %.3f s per view\n",
           100 * m.accuracy.informed, 100 * m.accuracy.chosen, static_cast<long long>(m.informed_views),
           m.informed_seconds);
   if (std::isfinite(m.accuracy.found))
