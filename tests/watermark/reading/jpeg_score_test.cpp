@@ -11,29 +11,14 @@
 #include <utility>
 
 #include "blurred.h"
+#include "jpeg_trace.h"
 #include "support/catch.h"
+#include "watermark/reading/jpeg_view.h"
 
 using namespace fieldmark;
 using namespace fieldmark::watermark;
 
 namespace {
-
-constexpr Index kHeight = 104, kWidth = 136;
-
-// Returns waves, edges and fine grain; the amplitude of the grain sets the amount of detail.
-Tensor<float> view_image(float grain, std::uint64_t seed) {
-  const CounterRng rng(seed, 1);
-  Tensor<float> x({kHeight, kWidth, 3});
-  for (Index p = 0; p < kHeight * kWidth; ++p) {
-    const auto u = static_cast<float>(p % kWidth), v = static_cast<float>(p / kWidth);
-    const float edge = std::fmod(u + 2 * v, 37.f) < 18 ? 0.12f : -0.12f;
-    const auto noise = rng.normal2(static_cast<std::uint64_t>(p));
-    for (Index c = 0; c < 3; ++c)
-      x[3 * p + c] = 0.5f + edge + 0.1f * std::sin(0.21f * u + static_cast<float>(c)) +
-                     grain * noise[static_cast<std::size_t>(c % 2)];
-  }
-  return quantize8(x);
-}
 
 // Returns a faint pattern at the scale of a mark, with the given rms amplitude.
 Tensor<float> pattern(float amplitude) {
@@ -79,7 +64,7 @@ Right strips_right(int quality, float amplitude) {
     Tensor<float> marked = base;
     for (Index i = 0; i < marked.size(); ++i) marked[i] += mark[i] * sign(i / 3 / kWidth, i / 3 % kWidth);
     const Tensor<float> seen = jpeg_round_trip(quantize8(marked), quality);
-    const JpegScore s = jpeg_score(seen, base, mark, kEverywhere, *find_jpeg(seen));
+    const JpegScore s = JpegImage(seen, kEverywhere, *find_jpeg(seen)).score(base, mark);
     for (Index y = 0; y < kHeight; y += 8)
       for (Index x = 0; x < kWidth; x += 34) {
         double ours = 0, plain = 0;
@@ -99,39 +84,6 @@ Right strips_right(int quality, float amplitude) {
 
 }  // namespace
 
-TEST_CASE("find_jpeg: names quality and chroma of what was compressed, and nothing else") {
-  for (const std::uint64_t seed : {1u, 2u}) {
-    const Tensor<float> base = view_image(0.05f, seed);
-    CHECK_FALSE(find_jpeg(base).has_value());
-    for (const int quality : {10, 30, 50, 75, 90}) {
-      INFO(quality);
-      const auto half = find_jpeg(jpeg_round_trip(base, quality));
-      REQUIRE(half.has_value());
-      CHECK(half->quality == quality);
-      CHECK(half->subsampled);
-      const auto full = find_jpeg(distort::jpeg444(base, quality));
-      REQUIRE(full.has_value());
-      CHECK(full->quality == quality);
-      CHECK_FALSE(full->subsampled);
-    }
-  }
-  CHECK_FALSE(find_jpeg(Tensor<float>({40, 40, 3})).has_value());
-  CHECK_FALSE(find_jpeg(Tensor<float>({0, 40, 3})).has_value());
-  CHECK_FALSE(find_jpeg(Tensor<float>({40, 40, 3}, std::numeric_limits<float>::quiet_NaN())).has_value());
-}
-
-TEST_CASE("find_jpeg: blocks in which the decoder clipped do not hide the rest") {
-  for (const int quality : {10, 50}) {
-    Tensor<float> x = view_image(0.05f, 1);
-    for (Index p = 0; p < kHeight * kWidth; ++p)  // an object before white, whose edge passes many blocks
-      if ((p / kWidth - 2 * (p % kWidth / 4)) % 32 < 12) std::fill_n(&x[3 * p], 3, 1.f);
-    const auto half = find_jpeg(jpeg_round_trip(x, quality));
-    REQUIRE(half.has_value());
-    CHECK(half->quality == quality);
-    CHECK(half->subsampled);
-  }
-}
-
 TEST_CASE("jpeg_score: an image of which edges were cut off is read from its first whole block on") {
   const Tensor<float> base = view_image(0.03f, 5), mark = pattern(0.01f);
   const Tensor<float> seen = jpeg_round_trip(sum(base, mark, 1), 30);
@@ -150,8 +102,8 @@ TEST_CASE("jpeg_score: an image of which edges were cut off is read from its fir
   CHECK(trace->left == 11);
   CHECK(trace->top == 11);
   const std::vector<double> object(static_cast<std::size_t>((kHeight - kTop) * (kWidth - kLeft)), 1.0);
-  const JpegScore whole = jpeg_score(seen, base, mark, kEverywhere, *find_jpeg(seen));
-  const JpegScore part = jpeg_score(cut(seen), cut(base), cut(mark), object, *trace);
+  const JpegScore whole = JpegImage(seen, kEverywhere, *find_jpeg(seen)).score(base, mark);
+  const JpegScore part = JpegImage(cut(seen), object, *trace).score(cut(base), cut(mark));
   double both = 0, of_part = 0, of_whole = 0, outside = 0;
   for (Index y = 0; y < kHeight - kTop; ++y)
     for (Index x = 0; x < kWidth - kLeft; ++x)
@@ -171,19 +123,19 @@ TEST_CASE("jpeg_score: an image of which edges were cut off is read from its fir
 TEST_CASE("jpeg_log_likelihood: the render that was compressed is likelier than one in other tones or blur") {
   const Tensor<float> base = view_image(0.03f, 6), seen = jpeg_round_trip(base, 10);
   const JpegTrace trace{.quality = 10, .subsampled = true};
-  const double truth = jpeg_log_likelihood(seen, base, kEverywhere, trace);
+  const double truth = JpegImage(seen, kEverywhere, trace).log_likelihood(base);
   // An object of few blocks is judged by all of them.
   std::vector<double> few(kEverywhere.size(), 0);
   for (std::size_t p = 0; p < few.size(); ++p)
     if (p % kWidth < 16) few[p] = 1;
-  CHECK(jpeg_log_likelihood(seen, base, few, trace) >
-        jpeg_log_likelihood(seen, blurred(base, 0.8), few, trace));
+  CHECK(JpegImage(seen, few, trace).log_likelihood(base) >
+        JpegImage(seen, few, trace).log_likelihood(blurred(base, 0.8)));
   CHECK(std::isfinite(truth));
   CHECK(truth < 0);
   Tensor<float> toned = base;
   for (float& x : toned.data) x = 0.95f * x + 0.02f;
-  CHECK(truth > jpeg_log_likelihood(seen, toned, kEverywhere, trace) + 10);
-  CHECK(truth > jpeg_log_likelihood(seen, blurred(base, 0.8), kEverywhere, trace) + 10);
+  CHECK(truth > JpegImage(seen, kEverywhere, trace).log_likelihood(toned) + 10);
+  CHECK(truth > JpegImage(seen, kEverywhere, trace).log_likelihood(blurred(base, 0.8)) + 10);
 }
 
 TEST_CASE("jpeg_score: the precision is of the noise, whatever the mark's power") {
@@ -195,12 +147,12 @@ TEST_CASE("jpeg_score: the precision is of the noise, whatever the mark's power"
   // Pixels that hardly change are seen no better than those around them.
   for (Index p = 0; p < mark.size() / 3; p += 7)
     for (Index i = 3 * p; i < 3 * p + 3; ++i) uneven[i] *= 1e-3f;
-  const JpegScore once = jpeg_score(seen, base, mark, kEverywhere, trace);
-  CHECK(jpeg_score(seen, base, twice, kEverywhere, trace).precision.data == once.precision.data);
+  const JpegScore once = JpegImage(seen, kEverywhere, trace).score(base, mark);
+  CHECK(JpegImage(seen, kEverywhere, trace).score(base, twice).precision.data == once.precision.data);
   CHECK(information_of(once, mark) > 0);
-  const JpegScore other = jpeg_score(seen, base, uneven, kEverywhere, trace);
+  const JpegScore other = JpegImage(seen, kEverywhere, trace).score(base, uneven);
   for (Index i = 0; i < mark.size(); ++i) REQUIRE(other.precision[i] < 4 * once.precision[i]);
-  const JpegScore none = jpeg_score(seen, base, Tensor<float>(mark.shape), kEverywhere, trace);
+  const JpegScore none = JpegImage(seen, kEverywhere, trace).score(base, Tensor<float>(mark.shape));
   CHECK(std::ranges::all_of(none.precision.data, [](float x) { return x == 0; }));
 }
 
@@ -220,12 +172,12 @@ TEST_CASE("jpeg_score: the slope is that of the likelihood, and leans to no sign
     for (Index i = 0; i < mark.size(); ++i) out += static_cast<double>(s.score[i] * mark[i]);
     return out;
   };
-  const JpegScore unmarked = jpeg_score(jpeg_round_trip(base, 60), base, mark, kEverywhere, trace);
+  const JpegScore unmarked = JpegImage(jpeg_round_trip(base, 60), kEverywhere, trace).score(base, mark);
   const double information = information_of(unmarked, mark);
   CHECK(information > 0);
   CHECK(std::abs(along(unmarked)) < 4 * std::sqrt(information));
-  CHECK(along(jpeg_score(seen, base, mark, kEverywhere, trace)) > 0);
-  CHECK(along(jpeg_score(jpeg_round_trip(sum(base, mark, -1), 60), base, mark, kEverywhere, trace)) < 0);
+  CHECK(along(JpegImage(seen, kEverywhere, trace).score(base, mark)) > 0);
+  CHECK(along(JpegImage(jpeg_round_trip(sum(base, mark, -1), 60), kEverywhere, trace).score(base, mark)) < 0);
 }
 
 TEST_CASE("jpeg_score: says nothing off the object, and the same for one and two threads") {
@@ -239,10 +191,10 @@ TEST_CASE("jpeg_score: says nothing off the object, and the same for one and two
   double likelihoods[2];
   for (const int n : {1, 2}) {
     const ScopedThreads scope(n);
-    JpegScore s = jpeg_score(seen, base, mark, object, trace);
+    JpegScore s = JpegImage(seen, object, trace).score(base, mark);
     scores[n - 1] = std::move(s.score);
     precisions[n - 1] = std::move(s.precision);
-    likelihoods[n - 1] = jpeg_log_likelihood(seen, base, object, trace);
+    likelihoods[n - 1] = JpegImage(seen, object, trace).log_likelihood(base);
   }
   CHECK(scores[0].data == scores[1].data);
   CHECK(precisions[0].data == precisions[1].data);
@@ -258,15 +210,14 @@ TEST_CASE("jpeg_score: errors name what is wrong") {
   const Tensor<float> x({16, 16, 3}), other({16, 8, 3});
   const std::vector<double> object(256, 1.0);
   CHECK_THROWS_AS(find_jpeg(Tensor<float>({16, 16})), ShapeError);
-  CHECK_THROWS_WITH(
-      jpeg_score(x, other, x, object, {50, true}),
-      "[jpeg_score] render and object must fit the image [16, 16, 3], got [16, 8, 3] and 256 pixels");
-  CHECK_THROWS_WITH(
-      jpeg_score(x, x, other, object, {50, true}),
-      "[jpeg_score] mark and object must fit the image [16, 16, 3], got [16, 8, 3] and 256 pixels");
-  CHECK_THROWS_AS(jpeg_score(x, x, x, object, {0, true}), ValueError);
-  CHECK_THROWS_WITH(jpeg_log_likelihood(x, other, object, {50, true}),
-                    "[jpeg_log_likelihood] render and object must fit the image [16, 16, 3], got [16, 8, 3] "
-                    "and 256 pixels");
-  CHECK_THROWS_AS(jpeg_log_likelihood(x, x, object, {101, true}), ValueError);
+  CHECK_THROWS_WITH(JpegImage(x, object, {50, true}).score(other, x),
+                    "[jpeg_score] render must have the image's shape [16, 16, 3], got [16, 8, 3]");
+  CHECK_THROWS_WITH(JpegImage(x, object, {50, true}).score(x, other),
+                    "[jpeg_score] mark must have the image's shape [16, 16, 3], got [16, 8, 3]");
+  CHECK_THROWS_AS(JpegImage(x, object, {0, true}).score(x, x), ValueError);
+  CHECK_THROWS_WITH(JpegImage(x, object, {50, true}).log_likelihood(other),
+                    "[jpeg_log_likelihood] render must have the image's shape [16, 16, 3], got [16, 8, 3]");
+  CHECK_THROWS_WITH(JpegImage(x, std::vector<double>(255, 1.0), {50, true}),
+                    "[jpeg_image] object must have a value for each pixel of image [16, 16, 3], got 255");
+  CHECK_THROWS_AS(JpegImage(x, object, {101, true}).log_likelihood(x), ValueError);
 }

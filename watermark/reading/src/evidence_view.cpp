@@ -1,5 +1,6 @@
 #include "evidence_view.h"
 #include <fieldmark/imaging/resize.h>
+#include "jpeg_trace.h"
 #include "plain_border.h"
 
 #include <algorithm>

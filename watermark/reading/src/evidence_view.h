@@ -1,6 +1,6 @@
 #pragma once
 #include <fieldmark/nerf/camera.h>
-#include "jpeg_score.h"
+#include "jpeg_planes.h"
 #include "surround.h"
 
 #include <optional>

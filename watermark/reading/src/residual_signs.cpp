@@ -97,16 +97,15 @@ struct Likeliest {
 
 // A plain background of another colour was changed with the tones, or put there.
 Likeliest likeliest(const Surround& seen, const CachedView& render, float level,
-                    const std::vector<double>& object, const JpegTrace& jpeg) {
-  const Tensor<float>& image = own_image(seen);
+                    const std::vector<double>& object, const JpegImage& jpeg) {
   std::vector<Tensor<float>> bases{render.base};
   if (seen.plain.size() > 0)
     bases.push_back(before_background(render.base, render.opacity, {level, level, level}, seen.colour));
   Likeliest best;
   double most = std::numeric_limits<double>::lowest();
   for (const Tensor<float>& base : bases)
-    for (Shown& s : possible(image, base, object)) {
-      const double found = jpeg_log_likelihood(image, s.render, object, jpeg);
+    for (Shown& s : possible(own_image(seen), base, object)) {
+      const double found = jpeg.log_likelihood(s.render);
       if (!(found > most)) continue;
       most = found;
       best = {std::move(s), base};
@@ -163,11 +162,11 @@ MarkScore score_of(const EvidenceView& view, const CachedView& render, const ner
     return s;
   }
   leave_out_blocks(seen.covered, render.width, *view.jpeg, s.on_object);
-  const Likeliest best = likeliest(seen, render, level, s.on_object, *view.jpeg);
+  const JpegImage jpeg(own_image(seen), s.on_object, *view.jpeg);
+  const Likeliest best = likeliest(seen, render, level, s.on_object, jpeg);
   s.blur = best.shown.blur;
   change_colours(carriers, best.base, best.shown.tones);
-  JpegScore score = jpeg_score(own_image(seen), best.shown.render, blurred(carriers.whole, s.blur),
-                               s.on_object, *view.jpeg);
+  JpegScore score = jpeg.score(best.shown.render, blurred(carriers.whole, s.blur));
   s.score = std::move(score.score);
   s.precision = std::move(score.precision);
   return s;

@@ -10,10 +10,9 @@ namespace fieldmark::watermark {
 
 /// A part of a render on a grid, cut out along its outline.
 struct Outline {
-  Index height = 0, width = 0;  ///< of the grid
-  std::vector<Index> y, x;      ///< of the pixels inside
-  std::array<std::vector<float>, 3>
-      of_mean;  ///< their colours without the mean, unit length over all channels
+  Index height = 0, width = 0;                ///< of the grid
+  std::vector<Index> y, x;                    ///< of the pixels inside
+  std::array<std::vector<float>, 3> of_mean;  ///< their colours less the mean, unit length over all channels
 };
 
 /// Cuts a part out of a render.
