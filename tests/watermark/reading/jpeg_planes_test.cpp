@@ -1,5 +1,6 @@
 #include "jpeg_planes.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "support/catch.h"

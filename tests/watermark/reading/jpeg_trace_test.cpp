@@ -1,9 +1,9 @@
 #include "jpeg_trace.h"
-#include <fieldmark/core/error.h>
 #include <fieldmark/distort/jpeg444.h>
 #include <fieldmark/imaging/image.h>
 
 #include <algorithm>
+#include <limits>
 
 #include "support/catch.h"
 #include "watermark/reading/jpeg_view.h"
@@ -35,8 +35,9 @@ TEST_CASE("find_jpeg: names quality and chroma of what was compressed, and nothi
 TEST_CASE("find_jpeg: blocks in which the decoder clipped do not hide the rest") {
   for (const int quality : {10, 50}) {
     Tensor<float> x = view_image(0.05f, 1);
-    for (Index p = 0; p < kHeight * kWidth; ++p)  // an object before white, whose edge passes many blocks
-      if ((p / kWidth - 2 * (p % kWidth / 4)) % 32 < 12) std::fill_n(&x[3 * p], 3, 1.f);
+    for (Index p = 0; p < kJpegViewHeight * kJpegViewWidth;
+         ++p)  // an object before white, whose edge passes many blocks
+      if ((p / kJpegViewWidth - 2 * (p % kJpegViewWidth / 4)) % 32 < 12) std::fill_n(&x[3 * p], 3, 1.f);
     const auto half = find_jpeg(jpeg_round_trip(x, quality));
     REQUIRE(half.has_value());
     CHECK(half->quality == quality);

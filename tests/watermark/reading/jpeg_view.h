@@ -7,14 +7,14 @@
 
 namespace fieldmark {
 
-constexpr Index kHeight = 104, kWidth = 136;
+constexpr Index kJpegViewHeight = 104, kJpegViewWidth = 136;
 
 // Returns waves, edges and fine grain; the amplitude of the grain sets the amount of detail.
 inline Tensor<float> view_image(float grain, std::uint64_t seed) {
   const CounterRng rng(seed, 1);
-  Tensor<float> x({kHeight, kWidth, 3});
-  for (Index p = 0; p < kHeight * kWidth; ++p) {
-    const auto u = static_cast<float>(p % kWidth), v = static_cast<float>(p / kWidth);
+  Tensor<float> x({kJpegViewHeight, kJpegViewWidth, 3});
+  for (Index p = 0; p < kJpegViewHeight * kJpegViewWidth; ++p) {
+    const auto u = static_cast<float>(p % kJpegViewWidth), v = static_cast<float>(p / kJpegViewWidth);
     const float edge = std::fmod(u + 2 * v, 37.f) < 18 ? 0.12f : -0.12f;
     const auto noise = rng.normal2(static_cast<std::uint64_t>(p));
     for (Index c = 0; c < 3; ++c)

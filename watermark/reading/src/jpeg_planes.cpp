@@ -1,6 +1,5 @@
 #include "jpeg_planes.h"
 #include <fieldmark/engine/parallel.h>
-#include <fieldmark/engine/shape_checks.h>
 
 #include <algorithm>
 
@@ -54,7 +53,7 @@ JpegPlane component_of(const Tensor<float>& image, int component, Index cell) {
 
 JpegPlane decoded_component(const Tensor<float>& image, int component, Index cell) {
   JpegPlane p = component_of(image, component, cell);
-  if (cell == 1) return p;
+  if (cell == 1 || p.level.empty()) return p;
   std::vector<double> work;
   for (Index y = 0; y < p.height; ++y) sharpen(&p.level[at(y * p.width)], p.width, 1, work);
   for (Index x = 0; x < p.width; ++x) sharpen(&p.level[at(x)], p.height, p.width, work);

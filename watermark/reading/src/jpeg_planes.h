@@ -23,7 +23,7 @@ struct JpegPlane {
   std::vector<double> level;  ///< [height width] 0 to 255, chroma around 0
 };
 
-/// Returns the rows and columns from the first whole block on.
+/// Returns the rows and columns from the first whole block on; no rows or columns if there is none.
 /// @param x  [H, W, 3]
 Tensor<float> from_first_block(const Tensor<float>& x, const JpegTrace& trace);
 

@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <string>
 
+#include "highest.h"
 #include "jpeg_planes.h"
 #include "ordered_sum.h"
 #include "quantised_coefficient.h"
@@ -26,44 +26,8 @@ constexpr std::array kDeviations = [] {
   return d;
 }();
 constexpr std::array kFactors{0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0};
-constexpr std::size_t kNoChange = 3;     // factor 1
 constexpr Index kSample = 7, kFew = 16;  // blocks of which one tells renders apart, if that leaves so many
 constexpr double kOnObject = 32;         // least foreground pixels for a block to count in its band
-
-// Returns the number below `count` of the greatest value: of every second one, then of those beside it.
-template <class F>
-std::size_t highest(std::size_t count, const F& value) {
-  std::size_t top = 0;
-  double most = value(top);
-  const auto compare = [&](std::size_t i) {
-    if (const double next = value(i); next > most) most = next, top = i;
-  };
-  for (std::size_t i = 2; i < count; i += 2) compare(i);
-  const std::size_t second = top;
-  if (second > 0) compare(second - 1);
-  if (second + 1 < count) compare(second + 1);
-  return top;
-}
-
-// Climbs from `start` to the nearest maximum, the first of equal ones.
-template <class F>
-std::size_t climb(std::size_t count, std::size_t start, const F& value) {
-  std::size_t top = start;
-  double most = value(start);
-  while (top > 0) {
-    const double next = value(top - 1);
-    if (!(next >= most)) break;
-    most = next;
-    --top;
-  }
-  while (top >= start && top + 1 < count) {
-    const double next = value(top + 1);
-    if (!(next > most)) break;
-    most = next;
-    ++top;
-  }
-  return top;
-}
 
 // Undoes from_first_block(), with 0 elsewhere.
 Tensor<float> back_in_place(const Tensor<float>& x, const Shape& shape, const JpegTrace& trace) {
@@ -99,7 +63,7 @@ struct QuantisedComponent {
   Index cell, across = 0;  // pixels to a value's side; blocks to a row
   JpegBlock steps;
   std::vector<JpegBlock> number;          // of steps
-  std::vector<double> on_object, sample;  // [blocks] foreground pixels
+  std::vector<double> on_object, sample;  // [blocks] foreground values; the same of every seventh, else 0
 
  private:
   void count_object(std::span<const double> object, Index w, Index h) {
@@ -148,7 +112,8 @@ class ComponentScore {
 
   // Adds this component's score and precision.
   void add(const Tensor<float>& mark, JpegScore& out) const {
-    const std::vector<JpegBlock> marks = jpeg_coefficients(component_of(mark, component_, cell_), 0);
+    const std::vector<JpegBlock> marks =
+        jpeg_coefficients(component_of(mark, component_, cell_), 0, on_object_);
     const auto row = distort::jpeg_colour_row(component_);
     const double share = 255 / static_cast<double>(cell_ * cell_);
     const Index h = mark.shape[0], w = mark.shape[1], side = kJpegSide * cell_;
@@ -189,7 +154,7 @@ class ComponentScore {
     return product.value();
   }
 
-  // Maximum likelihood, first per band, where outliers may make several maxima, then per block.
+  // Maximum likelihood, first per band, then per block. Outliers may make several maxima.
   void fit_deviations() {
     parallel_for(64, 1, [&](Index begin, Index end) {
       for (auto k = at(begin); k < at(end); ++k) {
@@ -207,8 +172,8 @@ class ComponentScore {
     parallel_for(static_cast<Index>(number_.size()), 16, [&](Index begin, Index end) {
       for (auto b = at(begin); b < at(end); ++b)
         if (on_object_[b] > 0)
-          factor_[b] = kFactors[climb(kFactors.size(), kNoChange,
-                                      [&](std::size_t f) { return log_probability(b, kFactors[f]); })];
+          factor_[b] = kFactors[highest(kFactors.size(),
+                                        [&](std::size_t f) { return log_probability(b, kFactors[f]); })];
     });
   }
 
@@ -222,9 +187,9 @@ class ComponentScore {
   std::vector<double> factor_{};  // [blocks] on the band's deviation
 };
 
-void check_fit(const char* op, const char* what, const Shape& image, const Tensor<float>& fits) {
+void check_fit(const char* what, const Shape& image, const Tensor<float>& fits) {
   if (fits.shape != image)
-    throw ShapeError("[" + std::string(op) + "] " + what + " must have the image's shape " + image.str() +
+    throw ShapeError("[jpeg_image] " + std::string(what) + " must have the image's shape " + image.str() +
                      ", got " + fits.shape.str());
 }
 
@@ -238,6 +203,9 @@ JpegImage::JpegImage(const Tensor<float>& image, std::span<const double> object,
   if (std::ssize(object) != h * w)
     throw ShapeError("[jpeg_image] object must have a value for each pixel of image " + shape_.str() +
                      ", got " + std::to_string(object.size()));
+  if (trace.left < 0 || trace.top < 0 || trace.left >= w || trace.top >= h)
+    throw ValueError("[jpeg_image] left and top must be inside image " + shape_.str() + ", got " +
+                     std::to_string(trace.left) + " and " + std::to_string(trace.top));
   const Tensor<float> whole_blocks = from_first_block(image, trace);
   std::vector<double> in_blocks;
   for (Index y = trace.top; y < h; ++y)
@@ -248,7 +216,7 @@ JpegImage::JpegImage(const Tensor<float>& image, std::span<const double> object,
 JpegImage::~JpegImage() = default;
 
 double JpegImage::log_likelihood(const Tensor<float>& render) const {
-  check_fit("jpeg_log_likelihood", "render", shape_, render);
+  check_fit("render", shape_, render);
   const Tensor<float> part = from_first_block(render, trace_);
   double sum = 0;
   for (const QuantisedComponent& c : components_) sum += ComponentScore(c, part, c.sample).log_likelihood();
@@ -256,8 +224,8 @@ double JpegImage::log_likelihood(const Tensor<float>& render) const {
 }
 
 JpegScore JpegImage::score(const Tensor<float>& render, const Tensor<float>& mark) const {
-  check_fit("jpeg_score", "render", shape_, render);
-  check_fit("jpeg_score", "mark", shape_, mark);
+  check_fit("render", shape_, render);
+  check_fit("mark", shape_, mark);
   const Tensor<float> part = from_first_block(render, trace_), part_mark = from_first_block(mark, trace_);
   JpegScore of_part{Tensor<float>(part.shape), Tensor<float>(part.shape)};
   for (const QuantisedComponent& c : components_)

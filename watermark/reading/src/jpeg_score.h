@@ -21,14 +21,17 @@ struct QuantisedComponent;
 /// A compressed image whose coefficients judge renders and marks. With b the coefficients of a render, q the
 /// steps and n q the image's coefficients, which are known exactly where nothing was clipped,
 ///   P(n | b) = Phi((n + 1/2) q - b) - Phi((n - 1/2) q - b),   Phi of deviation s_band f_block.
-/// The deviations of render and image before compression are those that fit best: first per band, then per
-/// block, where the nearest maximum to 1 is taken.
+/// P has 2% of outliers besides. The deviations of render and image before compression are fitted by maximum
+/// likelihood: s_band over all blocks, then f_block.
 class JpegImage {
  public:
   /// @param image  [H, W, 3]   @param object  [H W] 1 on the foreground, else 0; other blocks do not count
-  /// @throws ShapeError if these do not fit   @throws ValueError if the quality is out of range
+  /// @throws ShapeError if these do not fit   @throws ValueError if the quality is out of range,
+  /// or the first whole block outside the image
   JpegImage(const Tensor<float>& image, std::span<const double> object, const JpegTrace& trace);
   ~JpegImage();
+  JpegImage(const JpegImage&) = delete;
+  JpegImage& operator=(const JpegImage&) = delete;
   /// Computes log P(image | render) of the blocks on the foreground: of every seventh if that leaves 16 or
   /// more, else of all. The deviations are those that fit these blocks.
   /// @param render  [H, W, 3] in the image's tones   @throws ShapeError if it does not fit

@@ -27,7 +27,8 @@ inline double probability(const RoundingInterval& i, double step) {
   return (1 - kOutlier) * p + kOutlier * step / kOutlierWay;
 }
 
-/// Returns d log P(n | b) / db.
+/// Returns d log P(n | b) / db: the difference of the bell curve at both ends, over P.
+/// @param i, step  as of probability()   @param deviation  of the interval, levels
 inline double log_slope(const RoundingInterval& i, double step, double deviation) {
   const double bells = std::exp(-0.5 * i.low * i.low) - std::exp(-0.5 * i.high * i.high);
   return (1 - kOutlier) * bells / (std::sqrt(2 * std::numbers::pi) * deviation * probability(i, step));

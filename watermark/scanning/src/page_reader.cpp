@@ -8,6 +8,8 @@
 #include <queue>
 #include <utility>
 
+#include "part_choice.h"
+
 namespace fieldmark::watermark {
 namespace {
 
@@ -16,15 +18,8 @@ constexpr Index kMostElongated = 8;    // longer to shorter side of a block: no 
 constexpr Index kMarginShare = 10;     // of a part's shorter side: renders of objects have a margin
 constexpr Index kLargest = 512;        // longer side of an image that is searched for an object, pixels
 constexpr Index kLeastReduced = 16;    // shorter side of the same image, and of a part of it
-// Longer side of a part that is read, pixels; below kSmallPart it shows little of the mark, and a larger part
-// replaces it.
-constexpr Index kLeastPart = 48, kSmallPart = 60;
-// Places that are tried. With its margins, a square object of 40 pixels has kLeastPart.
-constexpr ObjectSearch::Wanted kWholes{24, 40}, kQuarters{64, kLeastPart};
-// Agreement at which a part counts as found. In 96 images of something else, for two owners, whole objects
-// stayed below 0.8, quarters reached 0.927 and parts below kSmallPart 0.962.
-constexpr double kLeastWhole = 0.9, kLeastQuarter = 0.94, kLeastSmall = 0.97;
-constexpr double kSure = 0.95;  // agreement of a part, not a small one, that ends the search
+// Places that are tried. With its margins, a square object of 40 pixels has PartChoice::kLeast.
+constexpr ObjectSearch::Wanted kWholes{24, 40}, kQuarters{64, PartChoice::kLeast};
 
 using Colour = std::array<float, 3>;
 
@@ -63,10 +58,6 @@ nerf::Camera camera_of(const nerf::Camera& camera, const PixelBox& box) {
   part.width = box.width;
   part.height = box.height;
   return part;
-}
-
-double least_agreement(bool whole, bool large) {
-  return !large ? kLeastSmall : whole ? kLeastWhole : kLeastQuarter;
 }
 
 PixelBox box_of(const ObjectPlace& place) {
@@ -154,24 +145,18 @@ std::vector<PartReading> PageReader::read_object(const Tensor<float>& whole) {
   const Tensor<float> rgb = zoom < 1 ? resize_area(whole, side(h), side(w)) : whole;
   const float level = nerf::background_value(owner_.field.background);
   std::vector<PartReading> best;
-  bool whole_found = false, large_found = false;
-  double most = 0;
+  PartChoice choice;
   for (const ObjectPlace& place : objects_->find(rgb, kWholes, kQuarters)) {
-    if (whole_found && !place.whole) break;  // a quarter shows fewer cells
     const PixelBox box = box_of(place);
     const Index longer = std::max(box.width, box.height);
-    const bool large = longer >= kSmallPart;
-    if (longer < kLeastPart || (large_found && !large)) continue;
-    const bool replaces = large && !large_found;  // a small part, whatever its agreement
-    const double least = std::max(least_agreement(place.whole, large), replaces ? 0 : most);
+    const double needed = choice.needed(place.whole, longer);
+    if (!std::isfinite(needed)) continue;
     ImageReading found = reader_.read_near(cut(rgb, box, 0, {level, level, level}),
-                                           camera_of(place.camera, box), least, beyond(rgb, box));
+                                           camera_of(place.camera, box), needed, beyond(rgb, box));
     if (found.chosen != ReadingKind::informed) continue;
-    whole_found = place.whole;
-    large_found = large;
-    most = found.informed.agreement;
+    choice.take(place.whole, longer, found.informed.agreement);
     best = {{{back(box.x), back(box.y), back(box.width), back(box.height)}, std::move(found)}};
-    if (large && most >= kSure) break;
+    if (choice.is_final()) break;
   }
   return best;
 }

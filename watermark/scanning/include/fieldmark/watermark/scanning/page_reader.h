@@ -44,8 +44,8 @@ struct PageReading {
 ///     that do not agree; all blocks that agree are added up;
 ///   - for an object, the places where the image looks most like a render or a quarter of one (see
 ///     ObjectSearch). There, InformedReader::read_near() looks at the pixels inside the outline alone, and
-///     the object counts as found at an agreement of 0.9. Parts of 48 to 59 pixels need 0.95, and give way
-///     to a larger one.
+///     the object counts as found at an agreement of 0.9, a quarter at 0.94. Parts of 48 to 59 pixels need
+///     0.97, and give way to a larger one.
 /// The choice depends on agreement alone and on neither key nor message, so the evidence may be tested
 /// against any.
 class PageReader {
