@@ -11,11 +11,11 @@ namespace {
 
 // The same by the midpoint rule.
 double integrated(double n, double step, double b, double deviation) {
-  constexpr int kPieces = 20000;
+  constexpr int kSteps = 20000;
   double sum = 0;
-  for (int i = 0; i < kPieces; ++i) {
-    const double x = ((n - 0.5 + (i + 0.5) / kPieces) * step - b) / deviation;
-    sum += std::exp(-0.5 * x * x) * step / (kPieces * deviation * std::sqrt(2 * std::numbers::pi));
+  for (int i = 0; i < kSteps; ++i) {
+    const double x = ((n - 0.5 + (i + 0.5) / kSteps) * step - b) / deviation;
+    sum += std::exp(-0.5 * x * x) * step / (kSteps * deviation * std::sqrt(2 * std::numbers::pi));
   }
   return (1 - kOutlier) * sum + kOutlier * step / kOutlierWay;
 }
