@@ -31,7 +31,7 @@ constexpr AlignmentStage kFineStretched[] = {
     {.size = 200, .blur = 1.2, .steps = 6, .stretched = true}};
 constexpr AlignmentStage kFine[] = {{.size = 96, .blur = 1.2, .steps = 10, .quick = true, .least = kFarOff},
                                     {.size = 200, .blur = 1.2, .steps = 6}};
-constexpr AlignmentStage kFinest[] = {{.size = 400, .blur = 1, .steps = 4}};
+constexpr AlignmentStage kFinest[] = {{.size = 400, .blur = 1, .steps = 20, .still = 0.02}};
 constexpr Index kPartSize = 200;  // longer side at which a part is aligned, pixels
 // Agreement of a part: at the right camera 0.90 to 0.99 at 48 pixels and 0.92 to 0.99 at 96, in images of
 // something else below 0.85 and 0.59 in 95 of 100 places.

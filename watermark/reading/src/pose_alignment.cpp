@@ -20,8 +20,7 @@ namespace {
 constexpr Index kParameters = 10;
 constexpr int kTonePasses = 2;
 constexpr double kToneHold = 1e-4;  // tones that bend more make wrong views agree
-constexpr double kStill = 0.2;      // pixels: a smaller motion ends the stage without another render
-constexpr double kNear = 0.3;       // pixels: a smaller motion that does not reduce the cost ends it, too
+constexpr double kNear = 1.5;  // of the motion that ends a stage: less, without a lower cost, ends it, too
 constexpr int kMostFailures = 3;
 constexpr double kOverRelaxation = 1.5;  // reweighting overestimates the curvature: steps fall short
 constexpr double kDamping = 1e-3;
@@ -203,12 +202,12 @@ class Stage {
       if (!newton.allFinite()) break;
       const CameraMotion motion = limited(length * newton);
       const double far = furthest(best, motion);
-      if (far < kStill && failures > 0) break;  // the linear model has just failed
-      if (far < kStill)
+      if (far < options_.still && failures > 0) break;  // the linear model has just failed
+      if (far < options_.still)
         return {moved(best.camera, best.pivot, limited(newton)), agreement(best), shown(best)};
       Look next = look(moved(best.camera, best.pivot, motion));
       if (next.points.empty() || !(cost(next, best.spread) < least)) {
-        if (far < kNear) break;
+        if (far < kNear * options_.still) break;
         damping *= 10;
         length = 1;
         ++failures;
@@ -258,7 +257,7 @@ class Stage {
 }  // namespace
 
 bool is_inexact(const Alignment& alignment) {
-  constexpr double kThin = 0.12, kLeast = 0.85, kExact = 0.992;
+  constexpr double kThin = 0.12, kLeast = 0.85, kExact = 0.997;
   return alignment.shown < kThin && alignment.agreement >= kLeast && alignment.agreement < kExact;
 }
 

@@ -9,8 +9,10 @@ namespace fieldmark::watermark {
 struct AlignmentStage {
   Index size = 64;  ///< longer side, pixels; at most the image's own
   double blur = 1;  ///< standard deviation of the Gaussian on image and render, pixels of this size
-  /// At most; a stage ends at a motion below 0.2 pixels, or below 0.3 if it does not reduce the cost.
-  int steps = 8;
+  int steps = 8;    ///< at most
+  /// Motion that ends the stage, pixels: a smaller one, or one below 1.5 times that if it does not reduce the
+  /// cost. Steps shorten long before the end, so a stage that must be exact wants a tenth of its error.
+  double still = 0.2;
   bool lens = true;        ///< true if the position moves besides focal length and principal point
   bool stretched = false;  ///< true if the aspect of pixels is free, too
   bool quick = false;      ///< true if ray steps are twice as long, which suffices for coarse stages
@@ -21,14 +23,14 @@ struct AlignmentStage {
 struct Alignment {
   nerf::Camera camera;  ///< of the image's size
   /// Correlation of the gradients of the image and of the last stage's last render, in the image's colours,
-  /// on the foreground, in [-1, 1]: 1 if they differ by a change of colour alone. A last motion of less than
-  /// 0.2 pixels comes after it.
+  /// on the foreground, in [-1, 1]: 1 if they differ by a change of colour alone. The motion that
+  /// ends the stage comes after it.
   double agreement = -1;
   double shown = 0;  ///< share of that render's pixels that show the field
 };
 
 /// True if an alignment at 200 pixels may leave the camera inexact: the object is thin, on less than 12% of
-/// the pixels, and the agreement is 0.85 to 0.992. docs/notes/reading.md has the measurements.
+/// the pixels, and the agreement is 0.85 to 0.997. docs/notes/reading.md has the measurements.
 bool is_inexact(const Alignment& alignment);
 
 /// Refines a camera until the field's render agrees with an image.
@@ -36,7 +38,7 @@ bool is_inexact(const Alignment& alignment);
 /// Each step renders the field, fits the image's colours (see tone_fit.h), and solves for the motion that
 /// reduces the residual (Lucas and Kanade 1981 with the field's depth; Levenberg-Marquardt damping; Cauchy
 /// weights). Motions are 1.5 Gauss-Newton steps, because reweighting makes single steps fall short; after a
-/// failed step they are one. A last one below 0.2 pixels is a single step, without rendering again. A rolled
+/// failed step they are one. The last one is a single step, without rendering again. A rolled
 /// camera, another focal length or another principal point explains a rotated, scaled or cropped image. Where
 /// the scene fills its images, the plain corners that a rotation leaves are ignored (see plain_border.h).
 /// Keeps buffers: use one object per thread. Results do not depend on the number of threads.
