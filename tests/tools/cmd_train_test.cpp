@@ -172,7 +172,7 @@ TEST_CASE("train says what is wrong with its data and its options, and leaves no
   std::filesystem::copy(job.owner, folder / "f.fm.checkpoint");
   const auto kept = run_command({"train", "--data", scene, "--out", out, "--steps", "1"});
   CHECK(kept.code == cli::kFailed);
-  CHECK_THAT(kept.err, Contains("f.fm.checkpoint"));
+  CHECK_THAT(kept.err, Contains("f.fm.checkpoint: exists already") && Contains("--resume"));
   CHECK_NOTHROW(watermark::Owner::load(folder / "f.fm.checkpoint"));
   std::filesystem::remove(folder / "f.fm.checkpoint");
   const auto nothing = run_command({"train", "--data", scene, "--out", out, "--steps", "2", "--resume"});

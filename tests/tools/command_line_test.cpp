@@ -1,4 +1,5 @@
 #include "cli/command_line.h"
+#include <fieldmark/core/files.h>
 
 #include <algorithm>
 #include <sstream>
@@ -6,6 +7,7 @@
 #include <vector>
 
 #include "support/catch.h"
+#include "support/temporary_folder.h"
 #include "tools/run_command.h"
 
 TEST_CASE("command_line: NaN and infinity are refused wherever a number is expected") {
@@ -28,11 +30,41 @@ TEST_CASE("command_line: a whole number is what it looks like") {
     const Outcome r = run_command({"info", "file", "--seed", value});
     INFO(value << ": " << r.err);
     CHECK(r.code == 2);
-    CHECK_THAT(r.err, Contains("--seed: expected a whole number from 0 to 18446744073709551615") &&
+    CHECK_THAT(r.err, Contains("--seed: expected a whole number") &&
                           Contains("got " + std::string(value)));
   }
   CHECK(run_command({"info", "missing", "--seed", "18446744073709551615"}).code == 1);
   CHECK(run_command({"info", "missing", "--seed", "0"}).code == 1);
+}
+
+TEST_CASE("command_line: a value out of range is told the range as people write it") {
+  const auto refused = [](const std::vector<std::string>& line, const std::string& text) {
+    const Outcome r = run_command(line);
+    INFO(r.err);
+    CHECK(r.code == 2);
+    CHECK_THAT(r.err, Contains(text));
+  };
+  for (const std::string value : {"0", "1.5", "5s", "1,5"})
+    refused({"verify", "--owner", "o", "--message", "a5", "--fpr", value, "view.png"},
+            "--fpr: expected a number from 1e-300 to 1, got " + value);
+  refused({"train", "--data", "d", "--out", "o", "--steps", "0"},
+          "--steps: expected a whole number from 1 to 10000000, got 0");
+}
+
+TEST_CASE("command_line: results replace neither an image nor a file that the command reads") {
+  const TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "data");
+  const std::string inside = folder / "data/transforms_train.json";
+  write_file_atomically(inside, "{}");
+  for (const std::string option : {"--json", "--report"}) {
+    const Outcome r = run_command({"data", "check", folder / "data", option, inside});
+    CHECK(r.code == 2);
+    CHECK_THAT(r.err, Contains(option + ": " + inside + " is a file of"));
+    const Outcome image = run_command({"info", inside, option, folder / "o.PNG"});
+    CHECK(image.code == 2);
+    CHECK_THAT(image.err, Contains("o.PNG has the name of an image"));
+  }
+  CHECK(read_text(inside) == "{}");
 }
 
 namespace {

@@ -2,15 +2,19 @@
 
 #include <fieldmark/core/error.h>
 #include <fieldmark/engine/parallel.h>
+#include <fieldmark/imaging/image_format.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <filesystem>
 #include <new>
 #include <ostream>
+#include <string_view>
 #include <utility>
 
 #include "cli/commands.h"
 #include "cli/context.h"
+#include "cli/outputs.h"
 #include "cli/suggest.h"
 
 namespace fieldmark::cli {
@@ -58,6 +62,32 @@ struct Subcommand {
   Command command;
 };
 
+bool is_inside(const std::filesystem::path& file, const std::filesystem::path& folder) {
+  std::error_code ignored;
+  const auto inner = std::filesystem::weakly_canonical(file, ignored),
+             outer = std::filesystem::weakly_canonical(folder, ignored);
+  return std::ranges::mismatch(outer, inner).in1 == outer.end();
+}
+
+// A result file must replace neither an image nor a file that the command reads.
+void check_result_file(const std::string& result, const std::string& file, const std::string& option,
+                       const std::string& value) {
+  std::error_code none;
+  if (same_file(file, value))
+    throw UsageError(result + ": " + file + " is the value of " + option + " too; name another file");
+  if (option != "--out" && std::filesystem::is_directory(value, none) &&
+      std::filesystem::exists(file, none) && is_inside(file, value))
+    throw UsageError(result + ": " + file + " is a file of " + value + ", which " + option +
+                     " reads; name another file");
+}
+
+void check_result_names(const CommonOptions& common) {
+  for (const auto& [result, file] : {std::pair{"--json", common.json}, {"--report", common.report}})
+    if (has_image_extension(file))
+      throw UsageError(std::string(result) + ": " + file + " has the name of an image; name a file of " +
+                       (std::string_view(result) == "--json" ? "JSON" : "Markdown"));
+}
+
 // A result file that another option or argument names would replace that file, or be replaced by it.
 void check_result_files(const CLI::App& app, const CommonOptions& common) {
   for (const CLI::Option* option : app.get_options()) {
@@ -68,9 +98,7 @@ void check_result_files(const CLI::App& app, const CommonOptions& common) {
     if (!path || name == "--json" || name == "--report") continue;
     for (const std::string& value : option->results())
       for (const auto& [result, file] : {std::pair{"--json", common.json}, {"--report", common.report}})
-        if (file != "-" && same_file(file, value))
-          throw UsageError(std::string(result) + ": " + file + " is the value of " + name +
-                           " too; name another file");
+        if (!file.empty() && file != "-") check_result_file(result, file, name, value);
   }
   for (const CLI::App* nested : app.get_subcommands()) check_result_files(*nested, common);
 }
@@ -107,6 +135,7 @@ class Program {
     for (auto& [sub, command] : subcommands_) {
       if (!sub->parsed()) continue;
       check_result_files(*sub, common_);
+      check_result_names(common_);
       Context context(common_, line, out_, err_);
       const int code = command(context);
       return context.left_out() ? kFailed : code;

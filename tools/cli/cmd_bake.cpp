@@ -64,7 +64,7 @@ int run_bake(const BakeArguments& options, Context& context) {
   if (std::filesystem::exists(options.out) && std::filesystem::equivalent(options.out, options.owner))
     throw UsageError("--out: " + options.out + " is the owner's file");
   check_writable(options.out);
-  if (!options.resume) check_writable(checkpoint);  // a checkpoint of embed holds a key
+  if (!options.resume) check_new_checkpoint(checkpoint);
   auto owner = watermark::Owner::load(options.owner);
   if (options.mark_psnr) {
     if (!owner.mark().has_gain())

@@ -148,7 +148,7 @@ int run_embed(const EmbedArguments& options, Context& context) {
       std::filesystem::path(options.out).lexically_normal())
     throw UsageError("--image: " + image + " is the file of --out; name another file");
   check_writable(options.out);
-  if (!options.resume) check_writable(checkpoint);  // that of an interrupted run, with its key
+  if (!options.resume) check_new_checkpoint(checkpoint);
   check_writable_page(image);
   for (const auto& name : options.under)
     read_option("--distort", [&] { return distort::parse_distortion(name); });

@@ -260,7 +260,7 @@ int run_train(const TrainArguments& options, Context& context) {
   const std::string checkpoint = options.out + ".checkpoint";
   check_preset(options);
   check_writable(options.out);
-  if (!options.resume) check_writable(checkpoint);  // a checkpoint of embed holds a key
+  if (!options.resume) check_new_checkpoint(checkpoint);
   if (options.refinement.poses) check_writable_page(cameras_file(options.out));
   const nerf::Dataset data = training_data(options, context);
   check_scene(options, data, context);

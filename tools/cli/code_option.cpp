@@ -29,8 +29,7 @@ void add_code_options(CommandLine& app, CodeOption& o) {
   app.add_option(
          "--bits", o.bits,
          "Length of the message in bits, 1 to the number of cells, for presets paper and code as embedded;\n"
-         "default: four bits per digit of --message if that differs from the length embedded, else "
-         "that")
+         "default: the length embedded, or four bits per digit of --message if that is given and differs")
       ->range(Index{1}, kMostBits)
       ->type_name("N")
       ->default_str("");

@@ -1,5 +1,7 @@
 #include "cli/command_line.h"
 
+#include <fieldmark/core/number_text.h>
+
 #include <CLI/CLI.hpp>
 #include <charconv>
 #include <cmath>
@@ -25,9 +27,10 @@ std::string fault_of_whole(const std::string& text) {
   const bool octal = text.size() > first + 1 && text[first] == '0';
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error == std::errc{} && end == text.data() + text.size() && !octal) return "";
-  return "expected a whole number from " + std::to_string(std::numeric_limits<T>::min()) + " to " +
-         std::to_string(std::numeric_limits<T>::max()) + " in decimal digits without leading zeros, got " +
-         text;
+  if (error == std::errc::result_out_of_range)
+    return "expected a whole number from " + number_text(std::numeric_limits<T>::min()) + " to " +
+           number_text(std::numeric_limits<T>::max()) + ", got " + text;
+  return "expected a whole number in decimal digits without leading zeros, got " + text;
 }
 
 std::string fault_of_empty(const std::string& text) {
@@ -52,10 +55,22 @@ Option Option::default_str(const std::string& text) { return option_->default_st
 Option Option::group(const std::string& name) { return option_->group(name), *this; }
 // Without a description: help texts, which name the range in words, would repeat it.
 Option Option::whole(std::int64_t low, std::int64_t high) {
-  return option_->check(CLI::Range(low, high).description("")), *this;
+  return check([=](const std::string& text) {
+    std::int64_t value = 0;
+    const bool inside = CLI::detail::lexical_cast(text, value) && value >= low && value <= high;
+    return inside ? ""
+                  : "expected a whole number from " + number_text(low) + " to " + number_text(high) +
+                        ", got " + text;
+  });
 }
 Option Option::real(double low, double high) {
-  return option_->check(CLI::Range(low, high).description("")), *this;
+  return check([=](const std::string& text) {
+    double value = 0;
+    const bool inside = CLI::detail::lexical_cast(text, value) && value >= low && value <= high;
+    return inside
+               ? ""
+               : "expected a number from " + number_text(low) + " to " + number_text(high) + ", got " + text;
+  });
 }
 Option Option::one_of(const std::vector<std::string>& names) {
   return option_->check(CLI::IsMember(names).description("")), *this;

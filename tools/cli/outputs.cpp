@@ -71,6 +71,14 @@ void check_writable(const std::string& path) {
   if (const auto model = model_at(path); model && model->secret) refuse(path, *model);
 }
 
+void check_new_checkpoint(const std::string& path) {
+  AtomicFile{path};
+  if (fs::exists(path))
+    throw IoError(path +
+                  ": exists already, and the work of an interrupted run would be lost; continue it with "
+                  "--resume, or move the file away");
+}
+
 void check_writable_page(const std::string& path) {
   AtomicFile{path};
   if (const auto model = model_at(path)) refuse(path, *model);

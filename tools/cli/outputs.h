@@ -13,6 +13,10 @@ bool same_file(const std::filesystem::path& a, const std::filesystem::path& b);
 /// @throws IoError naming the file and what to do
 void check_writable(const std::string& path);
 
+/// Checks the checkpoint that a new run will write: there is none of an interrupted run, which would be lost.
+/// @throws IoError naming the file and what to do
+void check_new_checkpoint(const std::string& path);
+
 /// As check_writable(), for text and images, which must not replace a field or checkpoint either.
 void check_writable_page(const std::string& path);
 
