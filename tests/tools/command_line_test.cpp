@@ -30,7 +30,7 @@ TEST_CASE("command_line: a whole number is what it looks like") {
     const Outcome r = run_command({"info", "file", "--seed", value});
     INFO(value << ": " << r.err);
     CHECK(r.code == 2);
-    CHECK_THAT(r.err, Contains("--seed: expected a whole number") &&
+    CHECK_THAT(r.err, Contains("--seed: expected a whole number from 0 to 18446744073709551615") &&
                           Contains("got " + std::string(value)));
   }
   CHECK(run_command({"info", "missing", "--seed", "18446744073709551615"}).code == 1);
@@ -47,8 +47,9 @@ TEST_CASE("command_line: a value out of range is told the range as people write 
   for (const std::string value : {"0", "1.5", "5s", "1,5"})
     refused({"verify", "--owner", "o", "--message", "a5", "--fpr", value, "view.png"},
             "--fpr: expected a number from 1e-300 to 1, got " + value);
-  refused({"train", "--data", "d", "--out", "o", "--steps", "0"},
-          "--steps: expected a whole number from 1 to 10000000, got 0");
+  refused(
+      {"train", "--data", "d", "--out", "o", "--steps", "0"},
+      "--steps: expected a whole number from 1 to 10000000 in decimal digits without leading zeros, got 0");
 }
 
 TEST_CASE("command_line: results replace neither an image nor a file that the command reads") {

@@ -9,7 +9,6 @@
 #include <filesystem>
 #include <new>
 #include <ostream>
-#include <string_view>
 #include <utility>
 
 #include "cli/commands.h"
@@ -69,38 +68,47 @@ bool is_inside(const std::filesystem::path& file, const std::filesystem::path& f
   return std::ranges::mismatch(outer, inner).in1 == outer.end();
 }
 
-// A result file must replace neither an image nor a file that the command reads.
-void check_result_file(const std::string& result, const std::string& file, const std::string& option,
-                       const std::string& value) {
+struct ResultFile {
+  const char* option;
+  std::string file;
+};
+
+std::vector<ResultFile> result_files(const CommonOptions& common) {
+  std::vector<ResultFile> all{{"--json", common.json}, {"--report", common.report}};
+  std::erase_if(all, [](const ResultFile& r) { return r.file.empty() || r.file == "-"; });
+  return all;
+}
+
+// A result file must be no value of another option, and no file of a folder that the command reads.
+void check_against_value(const ResultFile& result, const std::string& option, const std::string& value) {
   std::error_code none;
-  if (same_file(file, value))
-    throw UsageError(result + ": " + file + " is the value of " + option + " too; name another file");
+  const std::string begin = std::string(result.option) + ": " + result.file;
+  if (same_file(result.file, value))
+    throw UsageError(begin + " is the value of " + option + " too; name another file");
   if (option != "--out" && std::filesystem::is_directory(value, none) &&
-      std::filesystem::exists(file, none) && is_inside(file, value))
-    throw UsageError(result + ": " + file + " is a file of " + value + ", which " + option +
-                     " reads; name another file");
+      std::filesystem::exists(result.file, none) && is_inside(result.file, value))
+    throw UsageError(begin + " is a file of " + value + ", which " + option + " reads; name another file");
 }
 
-void check_result_names(const CommonOptions& common) {
-  for (const auto& [result, file] : {std::pair{"--json", common.json}, {"--report", common.report}})
-    if (has_image_extension(file))
-      throw UsageError(std::string(result) + ": " + file + " has the name of an image; name a file of " +
-                       (std::string_view(result) == "--json" ? "JSON" : "Markdown"));
-}
-
-// A result file that another option or argument names would replace that file, or be replaced by it.
-void check_result_files(const CLI::App& app, const CommonOptions& common) {
+void check_against_options(const CLI::App& app, const ResultFile& result) {
   for (const CLI::Option* option : app.get_options()) {
     const bool path = std::ranges::any_of(kPathTypes, [&](const char* type) {
       return option->get_type_name().find(type) != std::string::npos;
     });
     const std::string name = option->get_name();
     if (!path || name == "--json" || name == "--report") continue;
-    for (const std::string& value : option->results())
-      for (const auto& [result, file] : {std::pair{"--json", common.json}, {"--report", common.report}})
-        if (!file.empty() && file != "-") check_result_file(result, file, name, value);
+    for (const std::string& value : option->results()) check_against_value(result, name, value);
   }
-  for (const CLI::App* nested : app.get_subcommands()) check_result_files(*nested, common);
+  for (const CLI::App* nested : app.get_subcommands()) check_against_options(*nested, result);
+}
+
+void check_result_files(const CLI::App& app, const CommonOptions& common) {
+  for (const ResultFile& result : result_files(common)) {
+    check_against_options(app, result);
+    if (has_image_extension(result.file))
+      throw UsageError(std::string(result.option) + ": " + result.file +
+                       " has the name of an image; name another file");
+  }
 }
 
 class Program {
@@ -135,7 +143,6 @@ class Program {
     for (auto& [sub, command] : subcommands_) {
       if (!sub->parsed()) continue;
       check_result_files(*sub, common_);
-      check_result_names(common_);
       Context context(common_, line, out_, err_);
       const int code = command(context);
       return context.left_out() ? kFailed : code;

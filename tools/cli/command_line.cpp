@@ -12,25 +12,27 @@
 namespace fieldmark::cli {
 namespace {
 
-std::string fault_of_number(const std::string& text) {
+constexpr const char* kNumber = "number";  // name of the check that whole() and real() narrow
+
+std::string fault_of_number(const std::string& text, double low, double high) {
   double value = 0;
-  if (CLI::detail::lexical_cast(text, value) && !std::isfinite(value))
-    return "expected a finite number, got " + text;
-  return "";
+  const bool number = CLI::detail::lexical_cast(text, value);
+  if (number && !std::isfinite(value)) return "expected a finite number, got " + text;
+  if (number && value >= low && value <= high) return "";
+  return "expected a number from " + number_text(low) + " to " + number_text(high) + ", got " + text;
 }
 
 // CLI11 reads 010 as 8 and 0x10 as 16, and truncates values beyond the range of the type.
 template <class T>
-std::string fault_of_whole(const std::string& text) {
+std::string fault_of_whole(const std::string& text, T low, T high) {
   T value{};
   const std::size_t first = text.starts_with('-') ? 1 : 0;
   const bool octal = text.size() > first + 1 && text[first] == '0';
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error == std::errc{} && end == text.data() + text.size() && !octal) return "";
-  if (error == std::errc::result_out_of_range)
-    return "expected a whole number from " + number_text(std::numeric_limits<T>::min()) + " to " +
-           number_text(std::numeric_limits<T>::max()) + ", got " + text;
-  return "expected a whole number in decimal digits without leading zeros, got " + text;
+  const bool whole = error == std::errc{} && end == text.data() + text.size() && !octal;
+  if (whole && value >= low && value <= high) return "";
+  return "expected a whole number from " + number_text(low) + " to " + number_text(high) +
+         " in decimal digits without leading zeros, got " + text;
 }
 
 std::string fault_of_empty(const std::string& text) {
@@ -55,22 +57,15 @@ Option Option::default_str(const std::string& text) { return option_->default_st
 Option Option::group(const std::string& name) { return option_->group(name), *this; }
 // Without a description: help texts, which name the range in words, would repeat it.
 Option Option::whole(std::int64_t low, std::int64_t high) {
-  return check([=](const std::string& text) {
-    std::int64_t value = 0;
-    const bool inside = CLI::detail::lexical_cast(text, value) && value >= low && value <= high;
-    return inside ? ""
-                  : "expected a whole number from " + number_text(low) + " to " + number_text(high) +
-                        ", got " + text;
-  });
+  return narrow([=](const std::string& text) { return fault_of_whole(text, low, high); });
 }
 Option Option::real(double low, double high) {
-  return check([=](const std::string& text) {
-    double value = 0;
-    const bool inside = CLI::detail::lexical_cast(text, value) && value >= low && value <= high;
-    return inside
-               ? ""
-               : "expected a number from " + number_text(low) + " to " + number_text(high) + ", got " + text;
-  });
+  return narrow([=](const std::string& text) { return fault_of_number(text, low, high); });
+}
+Option Option::narrow(std::function<std::string(const std::string&)> fault) {
+  option_->get_validator(kNumber)->operation(
+      [fault = std::move(fault)](std::string& value) { return fault(value); });
+  return *this;
 }
 Option Option::one_of(const std::vector<std::string>& names) {
   return option_->check(CLI::IsMember(names).description("")), *this;
@@ -78,9 +73,9 @@ Option Option::one_of(const std::vector<std::string>& names) {
 Option Option::one_of(std::initializer_list<int> values) {
   return option_->check(CLI::IsMember(std::vector<int>(values)).description("")), *this;
 }
-Option Option::check(std::function<std::string(const std::string&)> fault) {
+Option Option::check(std::function<std::string(const std::string&)> fault, const std::string& name) {
   const auto checked = [fault = std::move(fault)](std::string& value) { return fault(value); };
-  return option_->check(CLI::Validator(checked, "")), *this;
+  return option_->check(CLI::Validator(checked, "", name)), *this;
 }
 Option Option::needs(Option other) { return option_->needs(other.option_), *this; }
 Option Option::excludes(Option other) { return option_->excludes(other.option_), *this; }
@@ -93,8 +88,14 @@ Option CommandLine::add_option(const std::string& name, T& value, const std::str
   Option option(app_->add_option(name, value, help));
   using Value = typename Held<T>::type;
   option.check(fault_of_empty);
-  if constexpr (std::is_floating_point_v<Value>) option.check(fault_of_number);
-  if constexpr (std::is_integral_v<Value>) option.check(fault_of_whole<Value>);
+  using Limits = std::numeric_limits<Value>;
+  if constexpr (std::is_floating_point_v<Value>)
+    option.check(
+        [](const std::string& text) { return fault_of_number(text, Limits::lowest(), Limits::max()); },
+        kNumber);
+  if constexpr (std::is_integral_v<Value>)
+    option.check([](const std::string& text) { return fault_of_whole(text, Limits::min(), Limits::max()); },
+                 kNumber);
   return option;
 }
 template Option CommandLine::add_option(const std::string&, std::string&, const std::string&);

@@ -38,8 +38,8 @@ class Option {
   }
   Option one_of(const std::vector<std::string>& names);
   Option one_of(std::initializer_list<int> values);
-  /// Rejects values for which `fault` returns a text.
-  Option check(std::function<std::string(const std::string& value)> fault);
+  /// Rejects values for which `fault` returns a text.   @param name  by which the check may be replaced
+  Option check(std::function<std::string(const std::string& value)> fault, const std::string& name = "");
   /// Requires another option, or excludes it.
   Option needs(Option other);
   Option excludes(Option other);
@@ -53,6 +53,7 @@ class Option {
  private:
   Option whole(std::int64_t low, std::int64_t high);
   Option real(double low, double high);
+  Option narrow(std::function<std::string(const std::string& value)> fault);
   CLI::Option* option_;
 };
 

@@ -181,6 +181,7 @@ TEST_CASE("page_reader: an object before an image of something else is found and
   const PageReading page = reader.read(before_something(owner, 160));
   REQUIRE(page.chosen() == ReadingKind::informed);
   CHECK(page.whole.chosen == ReadingKind::blind);
+  CHECK(page.agreement() >= 0.9);
   CHECK(p_of(owner, page.evidence()) < 1e-3);
   // Before other images, it counts as much as they do.
   CHECK(std::abs(power_of(page.evidence()) / power_of(page.whole.blind) - 1) < 1e-9);
@@ -194,6 +195,7 @@ TEST_CASE("page_reader: an object of less than 60 pixels is found if it agrees b
   const PixelBox& box = page.parts[0].box;
   CHECK(std::max(box.width, box.height) >= 48);
   CHECK(std::max(box.width, box.height) < 60);
+  CHECK(page.agreement() >= 0.97);
 }
 
 TEST_CASE("page_reader: an object of less than 60 pixels that agrees by less than 0.97 is not found") {
