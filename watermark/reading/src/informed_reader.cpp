@@ -42,6 +42,7 @@ constexpr AlignmentStage kPartCoarse[] = {
 constexpr AlignmentStage kPartFine[] = {
     {.size = 96, .blur = 1.2, .steps = 10, .quick = true, .least = kLeastOfPart},
     {.size = 200, .blur = 1.2, .steps = 6}};
+constexpr AlignmentStage kPartFinest[] = {{.size = kPartSize, .blur = 1, .steps = 20, .still = 0.02}};
 // Of the extractor, see joint_evidence(): without JPEG, it reads most of what blur and reduction took.
 constexpr double kTrust = 2;
 constexpr Index kLeastPartSide = 16;  // of a part, pixels
@@ -280,6 +281,8 @@ ImageReading InformedReader::read_near(const Tensor<float>& image, const nerf::C
     if (!(g.agreement >= kLeastOfPart)) return reading;
   }
   if (!(g.agreement >= least)) return reading;
+  found.camera = parts_->aligner.align(small, found.camera, kPartFinest, ignored(found.camera)).camera;
+  g.camera = found.camera.scaled(image.shape[1], image.shape[0]);
   const float level = nerf::background_value(owner_.field.background);
   Surround seen{.image = image, .plain = {}, .colour = {}, .covered = ignored(g.camera)};
   const Tensor<float> opacity = parts_->renderer.render(g.camera).opacity;

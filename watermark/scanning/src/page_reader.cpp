@@ -14,10 +14,13 @@ namespace fieldmark::watermark {
 namespace {
 
 constexpr double kMostOfImage = 0.95;  // share of its pixels; a larger block is the image
-constexpr Index kMostElongated = 8;    // longer to shorter side of a block: no view is longer
-constexpr Index kMarginShare = 10;     // of a part's shorter side: renders of objects have a margin
-constexpr Index kLargest = 512;        // longer side of an image that is searched for an object, pixels
-constexpr Index kLeastReduced = 16;    // shorter side of the same image, and of a part of it
+// Agreement of several blocks together that needs no second look. Below it, one of several views may agree
+// with a render of the other side: lego agrees with its own mirror image up to 0.957.
+constexpr double kSureTogether = 0.98;
+constexpr Index kMostElongated = 8;  // longer to shorter side of a block: no view is longer
+constexpr Index kMarginShare = 10;   // of a part's shorter side: renders of objects have a margin
+constexpr Index kLargest = 512;      // longer side of an image that is searched for an object, pixels
+constexpr Index kLeastReduced = 16;  // shorter side of the same image, and of a part of it
 // Places that are tried. With its margins, a square object of 40 pixels has PartChoice::kLeast.
 constexpr ObjectSearch::Wanted kWholes{24, 40}, kQuarters{64, PartChoice::kLeast};
 
@@ -60,6 +63,25 @@ nerf::Camera camera_of(const nerf::Camera& camera, const PixelBox& box) {
   return part;
 }
 
+bool is_sure(const ImageReading& reading, const ImageBlock& block) {
+  return block.parts.empty() || reading.informed.agreement >= kSureTogether;
+}
+
+// Takes a block in place of the parts found in it, unless one of them agrees better.
+void take_unless_better(PartReading block, std::vector<PartReading>& parts) {
+  const auto in_block = [&](const PartReading& part) {
+    const PixelBox &in = part.box, &out = block.box;
+    return in.x >= out.x && in.y >= out.y && in.x + in.width <= out.x + out.width &&
+           in.y + in.height <= out.y + out.height;
+  };
+  const auto better = [&](const PartReading& part) {
+    return in_block(part) && part.reading.informed.agreement > block.reading.informed.agreement;
+  };
+  if (std::ranges::any_of(parts, better)) return;
+  std::erase_if(parts, in_block);
+  parts.push_back(std::move(block));
+}
+
 PixelBox box_of(const ObjectPlace& place) {
   const auto shorter = std::min(place.window.width, place.window.height);
   const double margin = place.whole ? shorter / static_cast<double>(kMarginShare) : 0;
@@ -99,21 +121,24 @@ PageReading PageReader::read(const Tensor<float>& image, bool informed_too) {
   PageReading page{.whole = reader_.read(image, informed_too ? -1 : InformedReader::kLeastAgreement)};
   // At the size of the alignment, a long page of words is a strip of a few grey pixels, which may agree.
   if (too_long(image.shape[1], image.shape[0])) page.whole.chosen = ReadingKind::blind;
-  if (page.whole.chosen == ReadingKind::informed) return page;
+  const bool found = page.whole.chosen == ReadingKind::informed;
   const Tensor<float> rgb = opaque_image(image, nerf::background_value(owner_.field.background));
-  page.parts = read_blocks(rgb);
-  if (page.parts.empty() && owner_.field.space.kind == nerf::SpaceKind::cube) page.parts = read_object(rgb);
+  const ImageBlocks blocks = image_blocks(rgb, kLeastSide);
+  if (found && is_sure(page.whole, blocks.all)) return page;
+  page.parts = read_blocks(rgb, blocks);
+  if (found && !(page.agreement() > page.whole.informed.agreement)) page.parts.clear();
+  if (!found && page.parts.empty() && owner_.field.space.kind == nerf::SpaceKind::cube)
+    page.parts = read_object(rgb);
   return page;
 }
 
-std::vector<PartReading> PageReader::read_blocks(const Tensor<float>& rgb) {
+std::vector<PartReading> PageReader::read_blocks(const Tensor<float>& rgb, const ImageBlocks& found) {
   const bool object = owner_.field.space.kind == nerf::SpaceKind::cube;
-  const ImageBlocks found = image_blocks(rgb, kLeastSide);
   const auto smaller = [](const ImageBlock* a, const ImageBlock* b) { return a->box.area() < b->box.area(); };
   std::priority_queue<const ImageBlock*, std::vector<const ImageBlock*>, decltype(smaller)> blocks(smaller);
   blocks.push(&found.all);
   const auto all = static_cast<double>(rgb.shape[0] * rgb.shape[1]);
-  std::vector<PartReading> parts;
+  std::vector<PartReading> parts, doubtful;
   for (Index read = 0; read < kMostBlocks && !blocks.empty();) {
     const ImageBlock& block = *blocks.top();
     blocks.pop();
@@ -126,11 +151,16 @@ std::vector<PartReading> PageReader::read_blocks(const Tensor<float>& rgb) {
       PartReading part{
           box, reader_.read(cut(rgb, box, margin, found.background), InformedReader::kLeastAgreement)};
       if (part.reading.chosen == ReadingKind::informed) {
-        parts.push_back(std::move(part));
-        continue;
+        const bool sure = is_sure(part.reading, block);
+        (sure ? parts : doubtful).push_back(std::move(part));
+        if (sure) continue;
       }
     }
     for (const ImageBlock& inner : block.parts) blocks.push(&inner);
+  }
+  while (!doubtful.empty()) {  // the innermost first
+    take_unless_better(std::move(doubtful.back()), parts);
+    doubtful.pop_back();
   }
   return parts;
 }

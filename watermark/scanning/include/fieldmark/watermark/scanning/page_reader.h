@@ -21,7 +21,7 @@ struct PageReading {
   /// Weight of blind evidence where other images may have been found.
   static constexpr double kBlindWeight = 0.25;
   ImageReading whole;                   ///< of the whole image
-  std::vector<PartReading> parts = {};  ///< that agree with the field; empty if the whole image does
+  std::vector<PartReading> parts = {};  ///< that agree with the field; empty if the whole image counts
   /// Evidence of the detection chosen, [cells]: of the whole image, or the sum over all parts, each with the
   /// power of the whole image's blind evidence, so that a small part counts no less than an image in which
   /// nothing was found. Blind evidence counts a quarter, so that such images hardly dilute others.
@@ -41,7 +41,8 @@ struct PageReading {
 /// agrees with the field counts:
 ///   - the whole image, as by InformedReader, unless one side is more than 8 times the other;
 ///   - its blocks, which plain gaps separate (see image_blocks()), the largest first, and the parts of blocks
-///     that do not agree; all blocks that agree are added up;
+///     that do not agree; all blocks that agree are added up. An image or a block that has parts and agrees
+///     by less than 0.98 gives way to parts of which one agrees better;
 ///   - for an object, the places where the image looks most like a render or a quarter of one (see
 ///     ObjectSearch). There, InformedReader::read_near() looks at the pixels inside the outline alone, and
 ///     the object counts as found at an agreement of 0.9, a quarter at 0.94. Parts of 48 to 59 pixels need
@@ -66,7 +67,7 @@ class PageReader {
   PageReading read(const Tensor<float>& image, bool informed_too = false);
 
  private:
-  std::vector<PartReading> read_blocks(const Tensor<float>& rgb);
+  std::vector<PartReading> read_blocks(const Tensor<float>& rgb, const ImageBlocks& found);
   std::vector<PartReading> read_object(const Tensor<float>& whole);
 
   const Owner& owner_;
