@@ -289,10 +289,10 @@ Command add_embed(CommandLine& app) {
       ->range(20.0, 60.0)
       ->type_name("DB")
       ->default_str("");
-  app.add_option("--cells", o->cells,
-                 "Cells per axis of the scene's cube, 2 to 64; default: so many that nine of ten views show "
-                 "two cells "
-                 "per bit, eight in scenes of type place; for preset fast")
+  app.add_option(
+         "--cells", o->cells,
+         "Cells per axis of the scene's cube, 2 to 64; default: so many that nine of ten views show 250 "
+         "cells and two per bit, in scenes of type place eight per bit; for preset fast")
       ->range(2, 64)
       ->type_name("N")
       ->default_str("");

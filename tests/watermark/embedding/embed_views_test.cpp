@@ -216,7 +216,7 @@ TEST_CASE("embed_views: a view shows as many cells as have area, and slivers cou
   CHECK(cells_shown(std::span<const CachedView>(), 16) == 0);
 }
 
-TEST_CASE("embed_views: cells are as fine as a message needs, and no finer") {
+TEST_CASE("embed_views: cells are as fine as a message and a proof need, and no finer") {
   CachedView wall;  // 64 x 64 places of one plane: 256 cells of 16 an axis, of 16 places each
   for (Index k = 0; k < 64 * 64; ++k) {
     wall.weight.push_back(1);
@@ -225,6 +225,7 @@ TEST_CASE("embed_views: cells are as fine as a message needs, and no finer") {
   }
   const std::vector views(3, wall);
   const auto object = nerf::SpaceKind::cube, cut = nerf::SpaceKind::contracted;
+  CHECK(cells_for_message(views, 1, object) == 16);
   CHECK(cells_for_message(views, 128, object) == 16);
   CHECK(cells_for_message(views, 129, object) == 22);
   CHECK(cells_for_message(views, 129, nerf::SpaceKind::ndc) == 22);
@@ -232,4 +233,11 @@ TEST_CASE("embed_views: cells are as fine as a message needs, and no finer") {
   CHECK(cells_for_message(views, 33, cut) == 22);
   CHECK(cells_for_message(views, 4000, object) == 64);
   CHECK(cells_for_message({}, 1, object) == 64);
+  wall.weight.resize(32 * 64);  // half of it: 128 cells of 16 an axis, about 242 of 22
+  wall.position.resize(3 * 32 * 64);
+  const std::vector half(3, wall);
+  CHECK(cells_shown(half, 22) < 250);
+  CHECK(cells_for_message(half, 1, object) == 28);
+  CHECK(cells_for_message(half, 1, nerf::SpaceKind::ndc) == 28);
+  CHECK(cells_for_message(half, 1, cut) == 16);
 }

@@ -14,6 +14,7 @@ constexpr Index kCoarsest = 4;        // side of the patch over the smallest sid
 constexpr Index kParts = 4;           // per ray where it passes through more than a surface
 constexpr Index kFewestCells = 16, kMostCells = 64, kMoreCells = 6;
 constexpr double kCellsABit = 2, kCellsABitOfACut = 8, kPoorViews = 0.1;
+constexpr double kLeastCells = 250;  // so many carry the proof of a small part and the traces of three copies
 
 std::vector<nerf::Camera> cameras_of(const nerf::CameraSpan& span, const EmbedViewOptions& options,
                                      bool all_directions, Index size, std::uint64_t seed) {
@@ -164,8 +165,9 @@ double cells_shown(std::span<const CachedView> views, Index side) {
 }
 
 Index cells_for_message(std::span<const CachedView> views, Index bits, nerf::SpaceKind space) {
+  const auto n = static_cast<double>(bits);
   const double least =
-      (space == nerf::SpaceKind::contracted ? kCellsABitOfACut : kCellsABit) * static_cast<double>(bits);
+      space == nerf::SpaceKind::contracted ? kCellsABitOfACut * n : std::max(kCellsABit * n, kLeastCells);
   Index side = kFewestCells;
   while (side < kMostCells && cells_shown(views, side) < least) side += kMoreCells;
   return side;
