@@ -157,7 +157,7 @@ TEST_CASE("embed has cells as fine as its views and message need, unless they ar
     return watermark::Owner::load(owner).cells.side();
   };
   const Index few = cells_of("4", {});
-  CHECK(few == 34);  // the views show 250 cells and more
+  CHECK(few == 40);  // the views show 300 cells and more
   CHECK(cells_of("200", {}) > few);
   CHECK(cells_of("100", {"--cells", "14"}) == 14);
 }

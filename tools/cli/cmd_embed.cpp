@@ -291,7 +291,7 @@ Command add_embed(CommandLine& app) {
       ->default_str("");
   app.add_option(
          "--cells", o->cells,
-         "Cells per axis of the scene's cube, 2 to 64; default: so many that nine of ten views show 250 "
+         "Cells per axis of the scene's cube, 2 to 64; default: so many that nine of ten views show 300 "
          "cells and two per bit, in scenes of type place eight per bit; for preset fast")
       ->range(2, 64)
       ->type_name("N")

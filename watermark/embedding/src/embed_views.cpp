@@ -14,7 +14,7 @@ constexpr Index kCoarsest = 4;        // side of the patch over the smallest sid
 constexpr Index kParts = 4;           // per ray where it passes through more than a surface
 constexpr Index kFewestCells = 16, kMostCells = 64, kMoreCells = 6;
 constexpr double kCellsABit = 2, kCellsABitOfACut = 8, kPoorViews = 0.1;
-constexpr double kLeastCells = 250;  // so many carry the proof of a small part and the traces of three copies
+constexpr double kLeastCells = 300;  // with 277, two of 60 who pasted three copies were not traced
 
 std::vector<nerf::Camera> cameras_of(const nerf::CameraSpan& span, const EmbedViewOptions& options,
                                      bool all_directions, Index size, std::uint64_t seed) {

@@ -8,19 +8,17 @@
 #include <queue>
 #include <utility>
 
+#include "block_choice.h"
 #include "part_choice.h"
 
 namespace fieldmark::watermark {
 namespace {
 
 constexpr double kMostOfImage = 0.95;  // share of its pixels; a larger block is the image
-// Agreement of several blocks together that needs no second look. Below it, one of several views may agree
-// with a render of the other side: lego agrees with its own mirror image up to 0.957.
-constexpr double kSureTogether = 0.98;
-constexpr Index kMostElongated = 8;  // longer to shorter side of a block: no view is longer
-constexpr Index kMarginShare = 10;   // of a part's shorter side: renders of objects have a margin
-constexpr Index kLargest = 512;      // longer side of an image that is searched for an object, pixels
-constexpr Index kLeastReduced = 16;  // shorter side of the same image, and of a part of it
+constexpr Index kMostElongated = 8;    // longer to shorter side of a block: no view is longer
+constexpr Index kMarginShare = 10;     // of a part's shorter side: renders of objects have a margin
+constexpr Index kLargest = 512;        // longer side of an image that is searched for an object, pixels
+constexpr Index kLeastReduced = 16;    // shorter side of the same image, and of a part of it
 // Places that are tried. With its margins, a square object of 40 pixels has PartChoice::kLeast.
 constexpr ObjectSearch::Wanted kWholes{24, 40}, kQuarters{64, PartChoice::kLeast};
 
@@ -61,25 +59,6 @@ nerf::Camera camera_of(const nerf::Camera& camera, const PixelBox& box) {
   part.width = box.width;
   part.height = box.height;
   return part;
-}
-
-bool is_sure(const ImageReading& reading, const ImageBlock& block) {
-  return block.parts.empty() || reading.informed.agreement >= kSureTogether;
-}
-
-// Takes a block in place of the parts found in it, unless one of them agrees better.
-void take_unless_better(PartReading block, std::vector<PartReading>& parts) {
-  const auto in_block = [&](const PartReading& part) {
-    const PixelBox &in = part.box, &out = block.box;
-    return in.x >= out.x && in.y >= out.y && in.x + in.width <= out.x + out.width &&
-           in.y + in.height <= out.y + out.height;
-  };
-  const auto better = [&](const PartReading& part) {
-    return in_block(part) && part.reading.informed.agreement > block.reading.informed.agreement;
-  };
-  if (std::ranges::any_of(parts, better)) return;
-  std::erase_if(parts, in_block);
-  parts.push_back(std::move(block));
 }
 
 PixelBox box_of(const ObjectPlace& place) {

@@ -66,7 +66,7 @@ double cells_shown(const CachedView& view, Index side);
 double cells_shown(std::span<const CachedView> views, Index side);
 
 /// Returns the cells per axis at which one view shows the whole message: the least of 16, 22, 28 ... 64 at
-/// which cells_shown() is at least two per bit and at least 250, or 64 if none is. Fewer cells are easier to
+/// which cells_shown() is at least two per bit and at least 300, or 64 if none is. Fewer cells are easier to
 /// recognise; a bit that a view does not show cannot be read from it, and the p-values of a few cells are
 /// never small. Where space is contracted, images are crops of the scene and may be cropped again: at least
 /// eight per bit, so that two fifths of an image still show three.
