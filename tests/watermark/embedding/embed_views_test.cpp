@@ -235,6 +235,8 @@ TEST_CASE("embed_views: cells are as fine as a message and a proof need, and no 
   CHECK(cells_for_message(views, 33, cut) == 22);
   CHECK(cells_for_message(views, 4000, object) == 64);
   CHECK(cells_for_message({}, 1, object) == 64);
+  const std::vector few(3, row_of_cells({1, 1}));
+  CHECK(cells_for_message(few, 1, object) == 40);
   wall.weight.resize(32 * 64);  // half of it: 128 cells of 16 an axis, about 242 of 22
   wall.position.resize(3 * 32 * 64);
   const std::vector half(3, wall);

@@ -14,7 +14,9 @@ constexpr Index kCoarsest = 4;        // side of the patch over the smallest sid
 constexpr Index kParts = 4;           // per ray where it passes through more than a surface
 constexpr Index kFewestCells = 16, kMostCells = 64, kMoreCells = 6;
 constexpr double kCellsABit = 2, kCellsABitOfACut = 8, kPoorViews = 0.1;
-constexpr double kLeastCells = 300;  // with 277, two of 60 who pasted three copies were not traced
+// With 277, two of 60 recipients were not traced whose cells were pasted from three copies.
+constexpr double kLeastCells = 300;
+constexpr Index kFineForProof = 40;  // cells per axis beyond which only the message makes them finer
 
 std::vector<nerf::Camera> cameras_of(const nerf::CameraSpan& span, const EmbedViewOptions& options,
                                      bool all_directions, Index size, std::uint64_t seed) {
@@ -166,10 +168,13 @@ double cells_shown(std::span<const CachedView> views, Index side) {
 
 Index cells_for_message(std::span<const CachedView> views, Index bits, nerf::SpaceKind space) {
   const auto n = static_cast<double>(bits);
-  const double least =
-      space == nerf::SpaceKind::contracted ? kCellsABitOfACut * n : std::max(kCellsABit * n, kLeastCells);
+  const bool cut = space == nerf::SpaceKind::contracted;
+  const double for_message = (cut ? kCellsABitOfACut : kCellsABit) * n, for_proof = cut ? 0 : kLeastCells;
   Index side = kFewestCells;
-  while (side < kMostCells && cells_shown(views, side) < least) side += kMoreCells;
+  for (; side < kMostCells; side += kMoreCells) {
+    const double shown = cells_shown(views, side);
+    if (shown >= for_message && (shown >= for_proof || side >= kFineForProof)) break;
+  }
   return side;
 }
 

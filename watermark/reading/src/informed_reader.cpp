@@ -20,7 +20,7 @@ namespace {
 
 constexpr Index kByPlaces = 3, kByImage = 3, kByPart = 6;  // candidate cameras
 constexpr AlignmentStage kCoarse[] = {{.size = 48, .blur = 1.5, .steps = 6, .quick = true}};
-constexpr double kSure = 0.95;   // agreement: a symmetric object agrees with its mirror image, but less
+constexpr double kSure = 0.95;   // agreement: a symmetric object agrees with its mirror image, but seldom so well
 constexpr Index kFewViews = 64;  // tried first: they suffice for most images, at a seventh of the time
 constexpr double kStretches[] = {1.5, 1 / 1.5, 1.25, 0.8};  // of the width
 constexpr AlignmentStage kCoarseStretched[] = {
@@ -42,6 +42,7 @@ constexpr AlignmentStage kPartCoarse[] = {
 constexpr AlignmentStage kPartFine[] = {
     {.size = 96, .blur = 1.2, .steps = 10, .quick = true, .least = kLeastOfPart},
     {.size = 200, .blur = 1.2, .steps = 6}};
+// As the last of kPartFine, but to the end: steps shorten long before.
 constexpr AlignmentStage kPartFinest[] = {{.size = kPartSize, .blur = 1, .steps = 20, .still = 0.02}};
 // Of the extractor, see joint_evidence(): without JPEG, it reads most of what blur and reduction took.
 constexpr double kTrust = 2;

@@ -101,21 +101,25 @@ PageReading PageReader::read(const Tensor<float>& image, bool informed_too) {
   // At the size of the alignment, a long page of words is a strip of a few grey pixels, which may agree.
   if (too_long(image.shape[1], image.shape[0])) page.whole.chosen = ReadingKind::blind;
   const bool found = page.whole.chosen == ReadingKind::informed;
+  if (found && page.whole.informed.agreement >= kSureTogether) return page;
   const Tensor<float> rgb = opaque_image(image, nerf::background_value(owner_.field.background));
   const ImageBlocks blocks = image_blocks(rgb, kLeastSide);
-  if (found && is_sure(page.whole, blocks.all)) return page;
-  page.parts = read_blocks(rgb, blocks);
-  if (found && !(page.agreement() > page.whole.informed.agreement)) page.parts.clear();
-  if (!found && page.parts.empty() && owner_.field.space.kind == nerf::SpaceKind::cube)
-    page.parts = read_object(rgb);
+  page.parts = read_blocks(rgb, blocks, found ? blocks.all.parts : std::vector{blocks.all});
+  if (found) {
+    const auto against = [&](const PartReading& part) { return contradicts(part.reading, page.whole); };
+    if (std::ranges::none_of(page.parts, against)) page.parts.clear();
+    return page;
+  }
+  if (page.parts.empty() && owner_.field.space.kind == nerf::SpaceKind::cube) page.parts = read_object(rgb);
   return page;
 }
 
-std::vector<PartReading> PageReader::read_blocks(const Tensor<float>& rgb, const ImageBlocks& found) {
+std::vector<PartReading> PageReader::read_blocks(const Tensor<float>& rgb, const ImageBlocks& found,
+                                                 const std::vector<ImageBlock>& first) {
   const bool object = owner_.field.space.kind == nerf::SpaceKind::cube;
   const auto smaller = [](const ImageBlock* a, const ImageBlock* b) { return a->box.area() < b->box.area(); };
   std::priority_queue<const ImageBlock*, std::vector<const ImageBlock*>, decltype(smaller)> blocks(smaller);
-  blocks.push(&found.all);
+  for (const ImageBlock& block : first) blocks.push(&block);
   const auto all = static_cast<double>(rgb.shape[0] * rgb.shape[1]);
   std::vector<PartReading> parts, doubtful;
   for (Index read = 0; read < kMostBlocks && !blocks.empty();) {
@@ -137,8 +141,8 @@ std::vector<PartReading> PageReader::read_blocks(const Tensor<float>& rgb, const
     }
     for (const ImageBlock& inner : block.parts) blocks.push(&inner);
   }
-  while (!doubtful.empty()) {  // the innermost first
-    take_unless_better(std::move(doubtful.back()), parts);
+  while (!doubtful.empty()) {  // parts before the block that holds them
+    take_unless_contradicted(std::move(doubtful.back()), parts);
     doubtful.pop_back();
   }
   return parts;

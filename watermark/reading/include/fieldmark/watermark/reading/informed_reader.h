@@ -79,7 +79,8 @@ class InformedReader {
   ImageReading read(const Tensor<float>& image, double least = -1);
   /// Reads a part of an image that shows an object before anything, from a guess of its camera: pixels
   /// outside the object's outline do not count, neither for the alignment nor for the evidence. Chooses
-  /// informed, or leaves the evidence of both detectors empty if the agreement is below `least` or 0.8.
+  /// informed, or leaves the evidence of both detectors empty if the agreement is below `least` or 0.8. Before
+  /// evidence is taken, the camera is aligned once more; the agreement stays that before.
   /// @param image  [H, W, 3], sides of at least 16   @param start  of its size; the object must be within a
   /// few hundredths of its size of where it shows it   @param covered  [H W] 1 where something else covers
   /// the view, or empty   @throws ShapeError if the sizes differ or are below 16

@@ -37,12 +37,13 @@ struct PageReading {
   double agreement() const;
 };
 
-/// Detection that also reads views on a page, in a collage, and objects in other surroundings. The first that
-/// agrees with the field counts:
+/// Detection that also reads views on a page, in a collage, and objects in other surroundings. The first of
+/// these that agrees with the field counts, with one exception: an image or a block that gaps divide and that
+/// agrees by less than 0.98 is replaced by its parts if one of them agrees better by more than 0.02 and is
+/// mirrored where the whole is not, or the reverse.
 ///   - the whole image, as by InformedReader, unless one side is more than 8 times the other;
 ///   - its blocks, which plain gaps separate (see image_blocks()), the largest first, and the parts of blocks
-///     that do not agree; all blocks that agree are added up. An image or a block that has parts and agrees
-///     by less than 0.98 gives way to parts of which one agrees better;
+///     that do not agree; all blocks that agree are added up;
 ///   - for an object, the places where the image looks most like a render or a quarter of one (see
 ///     ObjectSearch). There, InformedReader::read_near() looks at the pixels inside the outline alone, and
 ///     the object counts as found at an agreement of 0.9, a quarter at 0.94. Parts of 48 to 59 pixels need
@@ -67,7 +68,8 @@ class PageReader {
   PageReading read(const Tensor<float>& image, bool informed_too = false);
 
  private:
-  std::vector<PartReading> read_blocks(const Tensor<float>& rgb, const ImageBlocks& found);
+  std::vector<PartReading> read_blocks(const Tensor<float>& rgb, const ImageBlocks& found,
+                                       const std::vector<ImageBlock>& first);
   std::vector<PartReading> read_object(const Tensor<float>& whole);
 
   const Owner& owner_;
