@@ -115,8 +115,10 @@ void bind_marks(py::module_& module) {
       .def(
           "__eq__", [](const Key& a, const Key& b) { return a == b; }, "other"_a, py::is_operator())
       .def("__repr__", [](const Key&) { return "<fieldmark key, secret>"; });
-  py::class_<Owner, std::shared_ptr<Owner>>(module, "Owner",
-                                            "An owner's secret: unmarked field, mark, extractor and key.")
+  py::class_<Owner, std::shared_ptr<Owner>>(
+      module, "Owner",
+      "An owner's secret: unmarked field, mark, extractor and, unless it is kept\n"
+      "elsewhere, the key.")
       .def_static(
           "load",
           [](const std::filesystem::path& path) { return std::make_shared<Owner>(Owner::load(path)); },
@@ -130,8 +132,11 @@ void bind_marks(py::module_& module) {
             return o.mark().has_gain() ? std::optional(o.options().mark_psnr) : std::nullopt;
           },
           "PSNR of marked to unmarked renders in dB; None for a mark whose networks decide it.")
-      .def_property_readonly(
-          "key", [](const Owner& o) { return o.key; }, "The secret key.")
+      .def_property(
+          "key", [](const Owner& o) { return o.key; },
+          [](Owner& o, const Key& key) { o.set_code(key, o.options().bits); },
+          "The secret key, None if the file holds none; another may be set, which is not saved unless\n"
+          "save() is called.")
       .def_property_readonly(
           "key_free", &Owner::key_free,
           "True if the networks were trained under random codes and know no key; False for owners\n"

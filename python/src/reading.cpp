@@ -204,7 +204,7 @@ py::dict verify(const Owner& owner, const std::string& message, const py::object
   result["payload"] = payload_of(wanted);
   result["views"] = evidence.size();
   result["detection"] = detection_used(evidence);
-  result["public_key"] = to_hex(watermark::public_key(owner.key));
+  result["public_key"] = to_hex(watermark::public_key(owner.own_key()));
   result["per_view"] = views;
   return result;
 }

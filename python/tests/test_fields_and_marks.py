@@ -260,6 +260,16 @@ def test_two_threads_use_one_field(field):
         np.testing.assert_array_equal(images[name], expected)
 
 
+def test_an_owner_takes_another_key(owner, tmp_path):
+    owner.save(tmp_path / "owner.fm")
+    again = fm.Owner.load(tmp_path / "owner.fm")
+    key = fm.Key.random()
+    again.key = key
+    assert again.key == key and again.key != owner.key
+    with pytest.raises(TypeError):
+        again.key = None
+
+
 def test_a_key_is_kept_and_not_shown(tmp_path):
     key = fm.Key.random()
     key.save(tmp_path / "key")

@@ -1,4 +1,5 @@
 #include "cli/cli.h"
+#include "cli/wrapped_help.h"
 
 #include <algorithm>
 #include <sstream>
@@ -67,6 +68,8 @@ TEST_CASE("Every command has help that names the common options", "[cli]") {
     CHECK(r.err.empty());
     for (const char* option : {"--help", "--seed", "--threads", "--json", "--report"})
       CHECK_THAT(r.out, Contains(option));
+    std::istringstream help(r.out);
+    for (std::string text; std::getline(help, text);) CHECK(text.size() <= cli::WrappedHelp::kWidth);
     ++commands;
   }
   CHECK(commands >= 20);

@@ -98,6 +98,33 @@ TEST_CASE("embed writes the same networks under another key, and info tells so",
   CHECK(one["sha256"] != other["sha256"]);  // only the key differs
 }
 
+TEST_CASE("embed --no-key writes the same bytes for any key, and reading then needs the key", "[embed]") {
+  const TinyJob& job = TinyJob::get();
+  const auto embedded = [&](unsigned key) {
+    const std::string owner = job.folder / ("keyless_" + std::to_string(key) + ".fm");
+    const auto r = tiny_embed(job.field, owner,
+                              {"--key", test_key_file(job.folder, key), "--no-key", "--measured-views", "1"});
+    INFO(r.err);
+    REQUIRE(r.code == cli::kOk);
+    CHECK_THAT(r.out + r.err, Contains("without the key, keep it secret"));
+    return owner;
+  };
+  const std::string one = embedded(7), other = embedded(9);
+  CHECK(read_bytes(one) == read_bytes(other));
+  CHECK(!watermark::Owner::load(one).key);
+  std::vector<std::string> bake{
+      "bake", "--owner", one, "--message", "a", "--out", job.folder / "keyless.field", "--steps", "1"};
+  const auto refused = run_command(bake);
+  CHECK(refused.code == cli::kUsage);
+  CHECK_THAT(refused.err, Contains("--key: OWNER holds no key"));
+  bake.insert(bake.end(), {"--key", test_key_file(job.folder, 7)});
+  CHECK(run_command(bake).code == cli::kOk);
+  const auto without =
+      run_command({"embed", "--field", job.field, "--out", job.folder / "no.fm", "--no-key"});
+  CHECK(without.code == cli::kUsage);
+  CHECK_THAT(without.err, Contains("--no-key requires --key"));
+}
+
 TEST_CASE("embed learns from views at several distances, and from several samples of a ray", "[embed]") {
   const TinyJob& job = TinyJob::get();
   const auto embed = [&](const std::string& distances, const std::string& samples) {

@@ -37,6 +37,16 @@ TEST_CASE("measure reports an owner's mark on several sets of cameras", "[measur
   }
 }
 
+TEST_CASE("measure says that an unmarked field does not differ", "[measure]") {
+  const TinyJob& job = TinyJob::get();
+  const auto r = run_command({"measure", "--owner", job.owner, "--field", job.field, "--message", "a",
+                              "--count", "1", "--informed-count", "0", "--json", "-"});
+  INFO(r.err);
+  REQUIRE(r.code == cli::kOk);
+  CHECK_THAT(r.err, Contains("against unmarked     no pixel differs"));
+  CHECK(nlohmann::json::parse(r.out)["psnr_base"].is_null());
+}
+
 TEST_CASE("measure gives a row for each of several sets of cameras", "[measure]") {
   const TinyJob& job = TinyJob::get();
   const TemporaryFolder folder;

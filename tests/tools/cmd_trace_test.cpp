@@ -97,7 +97,7 @@ TEST_CASE("trace finds at a rate of 1 whomever it tests, verify and bake take on
     for (std::size_t c = 0; c < sum.size(); ++c) sum[c] += evidence[c];
   }
   const std::vector<std::string> only{"Anna"};
-  const auto want = watermark::trace_copies(sum, owner.cells.weights(), owner.key,
+  const auto want = watermark::trace_copies(sum, owner.cells.weights(), owner.own_key(),
                                             watermark::message_from_hex("5", 4), only, 1e-6);
   CHECK(anna["statistic"].get<double>() == Approx(want[0].statistic).epsilon(1e-9));
   CHECK(anna["p_value"].get<double>() == Approx(want[0].p_value).epsilon(1e-9));

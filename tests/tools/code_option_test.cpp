@@ -65,6 +65,17 @@ TEST_CASE("code_option: another key deals the cells and signs, a copy's key deal
   CHECK(owner.key == copy_key(test_key(5), "Anna"));
 }
 
+TEST_CASE("code_option: an owner without a key needs one") {
+  const TemporaryFolder folder;
+  save_key(folder / "key", test_key(5));
+  Owner owner = small_owner();
+  owner.key.reset();
+  CHECK_THROWS_AS(choose({}, "", owner), cli::UsageError);
+  CHECK_THROWS_WITH(choose({}, "", owner), Contains("--key: OWNER holds no key"));
+  CHECK(choose({.key = folder / "key", .copy = "", .bits = 0}, "", owner).key == test_key(5));
+  CHECK(owner.key == test_key(5));
+}
+
 TEST_CASE("code_option: an owner of version 0.1 comes with a line on its bound") {
   Owner owner = Owner::load(std::filesystem::path(source_dir()) / "tests/regression/version_0_1/owner.fm");
   CHECK_THAT(choose({}, "", owner).notes, Contains("trained under its own key") && Contains("not proven"));

@@ -15,6 +15,7 @@
 #include "cli/context.h"
 #include "cli/outputs.h"
 #include "cli/suggest.h"
+#include "cli/wrapped_help.h"
 
 namespace fieldmark::cli {
 
@@ -117,7 +118,7 @@ class Program {
     app_.name("fieldmark");
     app_.require_subcommand(1);
     app_.set_version_flag("--version", FIELDMARK_VERSION);
-    app_.get_formatter()->column_width(34);
+    app_.formatter(std::make_shared<WrappedHelp>());
     for (const auto& entry : kCommands) {
       CLI::App* sub = app_.add_subcommand(entry.name, entry.help);
       sub->option_defaults()->always_capture_default();

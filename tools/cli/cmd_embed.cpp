@@ -40,7 +40,7 @@ struct EmbedArguments {
   MessageOption intended;
   Index views = watermark::EmbedViewOptions{}.count, samples = 0, measured_views = 200;
   std::vector<std::string> under;
-  bool resume = false;
+  bool no_key = false, resume = false;
 };
 
 // Returns the key. A run that started without --key made one and stored it in its checkpoint.
@@ -165,8 +165,9 @@ int run_embed(const EmbedArguments& options, Context& context) {
   auto recipe = recipe_of(options, field, context);
   const auto views = cached_views(options, field, recipe, context);
   if (options.mark_psnr == 0) recipe.suit_mark_psnr(field, views);
-  auto owner = recipe.make(field, key, views);
-  if (options.cells > 0) read_option("--cells", [&] { return owner.code(); });  // enough for the message
+  // Neither the checkpoint nor OWNER shall hold a key that is kept elsewhere.
+  auto owner = recipe.make(field, options.no_key ? std::nullopt : std::optional(key), views);
+  if (options.cells > 0) read_option("--cells", [&] { return owner.code(key); });  // enough for the message
   if (owner.mark().has_gain() && options.mark_psnr == 0) say_mark_psnr(owner, context);
   if (owner.mark().has_cells() && options.cells == 0) say_cells(owner, views, context);
   watermark::Embedder embedder(owner, views, recipe.embed);
@@ -181,18 +182,20 @@ int run_embed(const EmbedArguments& options, Context& context) {
     context.note("training ended in its warm start of " + std::to_string(embedder.warm_steps()) +
                  " steps: the mark is strong and hardly read; give it more --seconds");
   owner.save(options.out);
+  owner.key = key;
   std::filesystem::remove(checkpoint);
   check_writable_page(image);  // a link may lead to the owner
   write_image(image, owner, context.seed());
 
   const auto sha256 = sha256_file_hex(options.out);
-  const auto open = to_hex(watermark::public_key(owner.key));
+  const auto open = to_hex(watermark::public_key(key));
   context.text() << options.out << ": " << embedder.steps() << " steps in " << format_duration(seconds)
-                 << ", keep it secret\nsha256 " << sha256 << "\npublic key " << open << "\n"
+                 << (options.no_key ? ", without the key" : "") << ", keep it secret\nsha256 " << sha256
+                 << "\npublic key " << open << "\n"
                  << image << ": unmarked, marked, ten times the difference\n";
   Json commitment = nullptr;
   if (intended) {
-    commitment = watermark::commitment(sha256, owner.key, *intended);
+    commitment = watermark::commitment(sha256, key, *intended);
     context.text() << "commitment " << commitment.get<std::string>()
                    << ", to be time-stamped before the field is published\n";
   }
@@ -267,9 +270,13 @@ Command add_embed(CommandLine& app) {
   app.add_option("--out", o->out, "Owner file to write; OWNER.checkpoint during training")
       ->required()
       ->type_name("OWNER");
-  app.add_option("--key", o->key, "Key from `fieldmark key`; default: a new one, kept in OWNER")
-      ->type_name("KEY")
-      ->default_str("");
+  const auto key =
+      app.add_option("--key", o->key, "Key from `fieldmark key`; default: a new one, kept in OWNER")
+          ->type_name("KEY")
+          ->default_str("");
+  app.add_flag("--no-key", o->no_key,
+               "Leave the key out of OWNER; commands that read or bake the mark then need --key")
+      ->needs(key);
   app.add_option("--bits", o->bits, "Length in bits of the message that one view should show, 1 to 256")
       ->range(1, 256)
       ->type_name("N");

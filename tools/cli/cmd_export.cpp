@@ -114,7 +114,7 @@ Command add_export(CommandLine& app) {
   auto o = std::make_shared<ExportArguments>();
   app.add_option("--field", o->field, "Field to export")->required()->type_name("FIELD");
   app.add_option("--out", o->out,
-                 "File to write: .html, a page that shows the scene from all sides; .ply, the points of its\n"
+                 "File to write: .html, a page that shows the scene from all sides; .ply, the points of its "
                  "surface; .glb, a mesh")
       ->required()
       ->type_name("FILE");

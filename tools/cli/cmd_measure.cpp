@@ -221,11 +221,11 @@ Command add_measure(CommandLine& app) {
   add_code_options(app, o->code);
   add_copy_option(app, o->code, "Recipient of the baked copy");
   app.add_option("--cameras", o->cameras,
-                 "Cameras to measure from, separated by commas, one row each:\n"
-                 "novel (from the span of the training cameras),\n"
-                 "ring (elevation 30 degrees, radius 4.0311 units of the scene), sphere (all directions),\n"
-                 "extrapolated (over 30 degrees from every training direction where there are any),\n"
-                 "closer and farther (as novel, at other distances),\n"
+                 "Cameras to measure from, separated by commas, one row each: "
+                 "novel (from the span of the training cameras), "
+                 "ring (elevation 30 degrees, radius 4.0311 units of the scene), sphere (all directions), "
+                 "extrapolated (over 30 degrees from every training direction where there are any), "
+                 "closer and farther (as novel, at other distances), "
                  "test (of --data)")
       ->delimiter(',')
       ->one_of(nerf::camera_set_names())
@@ -239,7 +239,8 @@ Command add_measure(CommandLine& app) {
           ->type_name("N");
   app.add_option("--informed-count", o->informed_count,
                  "Views to read by informed detection as well, 0 to 100000; takes up to a second per view "
-                 "and distortion, some 4 s where the view does not agree with the field; default: 20, or 0 "
+                 "and distortion, some 4 s where the view does not agree with the field or gaps divide it; "
+                 "default: 20, or 0 "
                  "for marks without cells")
       ->range(0, 100000)
       ->type_name("N")

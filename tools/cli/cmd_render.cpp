@@ -241,15 +241,15 @@ Command add_render(CommandLine& app) {
   const Option cameras =
       app.add_option(
              "--cameras", o->cameras,
-             "Cameras to render from: novel (from the span of the training cameras),\n"
-             "ring (elevation 30 degrees, radius 4.0311 units of the scene), sphere (all directions),\n"
-             "extrapolated (over 30 degrees from every training direction where there are any),\n"
+             "Cameras to render from: novel (from the span of the training cameras), "
+             "ring (elevation 30 degrees, radius 4.0311 units of the scene), sphere (all directions), "
+             "extrapolated (over 30 degrees from every training direction where there are any), "
              "closer and farther (as novel, at other distances), test (of --data)")
           ->one_of(nerf::camera_set_names())
           ->type_name("SET");
   app.add_flag("--overwrite", o->overwrite,
                "Write to a folder that has images, and remove the views of earlier runs, view_N.png, "
-               "with\ntheir depth");
+               "with their depth");
   add_precision(app, o->precision);
   add_supersampling(app, o->supersampling);
   app.add_option("--count", o->count, "Cameras to draw, 1 to 100000; default: 10, or 120 along an orbit")
@@ -258,7 +258,7 @@ Command add_render(CommandLine& app) {
       ->type_name("N")
       ->default_str("");
   app.add_option("--path", o->path,
-                 "Cameras along a path: orbit (around the scene, at the height of the training cameras),\n"
+                 "Cameras along a path: orbit (around the scene, at the height of the training cameras), "
                  "or a JSON file with the keys of transforms.json")
       ->excludes(data)
       ->excludes(cameras)
@@ -268,7 +268,7 @@ Command add_render(CommandLine& app) {
                          ->type_name("N");
   app.add_flag("--alpha", o->alpha, "Keep the opacity as a fourth channel instead of a background");
   app.add_flag("--depth", o->depth,
-               "Also write NAME_depth.npy: distance along the viewing direction in units of the scene,\n"
+               "Also write NAME_depth.npy: distance along the viewing direction in units of the scene, "
                "NaN where the opacity is below 1/2");
   app.add_option("--size", o->size, "Longer side of the images in pixels, 1 to 8192; default: as trained")
       ->range(1, 8192)

@@ -359,7 +359,7 @@ Command add_train(CommandLine& app) {
   add_run_length(app, o->length, true);
   add_precision(app, o->precision);
   app.add_option("--target-psnr", o->target_psnr,
-                 "End training at this PSNR in dB, 1 to 100, of 4 validation images every 250 steps,\n"
+                 "End training at this PSNR in dB, 1 to 100, of 4 validation images every 250 steps, "
                  "or of the training rays if there are no validation images; default: off")
       ->range(1.0, 100.0)
       ->type_name("DB")
@@ -373,7 +373,7 @@ Command add_train(CommandLine& app) {
       ->default_str("");
   app.add_option(
          "--scene-type", o->scene_type,
-         "Type of scene. object: silhouettes in the images' alpha; plain: opaque object before one\n"
+         "Type of scene. object: silhouettes in the images' alpha; plain: opaque object before one "
          "colour; place: scene with a background; forward: cameras that look one way, with depth bounds;\n"
          "default: decided from images and cameras")
       ->one_of(nerf::scene_type_names())

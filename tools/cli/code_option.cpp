@@ -25,7 +25,7 @@ Index message_bits(const CodeOption& options, const std::string& hex, const wate
 }  // namespace
 
 void add_code_options(CommandLine& app, CodeOption& o) {
-  app.add_option("--key", o.key, "Key from `fieldmark key`; default: the owner's")->type_name("KEY");
+  app.add_option("--key", o.key, "Key from `fieldmark key`; default: that of OWNER")->type_name("KEY");
   app.add_option(
          "--bits", o.bits,
          "Length of the message in bits, 1 to the number of cells, for presets paper and code as embedded;\n"
@@ -42,7 +42,9 @@ void add_copy_option(CommandLine& app, CodeOption& o, const std::string& purpose
 watermark::Key choose_code(const CodeOption& options, const MessageOption& message, watermark::Owner& owner,
                            Context& context) {
   if (!options.copy.empty()) check_copies(owner);
-  const watermark::Key key = options.key.empty() ? owner.key : watermark::load_key(options.key);
+  if (options.key.empty() && !owner.key)
+    throw UsageError("--key: OWNER holds no key (embed --no-key); give the one that it was made for");
+  const watermark::Key key = options.key.empty() ? owner.own_key() : watermark::load_key(options.key);
   const Index bits = message_bits(options, message.message, owner, context);
   read_option(options.bits > 0 ? "--bits" : "--message", [&] {
     owner.set_code(options.copy.empty() ? key : watermark::copy_key(key, options.copy), bits);

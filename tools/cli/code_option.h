@@ -24,7 +24,7 @@ void add_copy_option(CommandLine& app, CodeOption& options, const std::string& p
 /// length is four bits per digit of --message if these do not fit the owner's usual length, and a note says
 /// so. Also calls note_unproven_bound().
 /// @return the key that signs and commits: that of --key or of the owner, never that of a copy
-/// @throws UsageError if the owner's cells cannot hold the message
+/// @throws UsageError if the owner's cells cannot hold the message, or no key is given and the owner has none
 watermark::Key choose_code(const CodeOption& options, const MessageOption& message, watermark::Owner& owner,
                            Context& context);
 

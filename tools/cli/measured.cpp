@@ -62,8 +62,11 @@ void print_measurement(std::ostream& out, const watermark::Measurement& m, const
   };
   print("%lld bits, %lld views of %s cameras, %s\n", static_cast<long long>(m.bits),
         static_cast<long long>(m.views), cameras.c_str(), m.baked ? "baked field" : "not baked");
-  print("against unmarked     %.2f dB, foreground %.2f dB, ssim %.4f\n", m.psnr_base, m.psnr_base_foreground,
-        m.ssim_base);
+  if (std::isfinite(m.psnr_base))
+    print("against unmarked     %.2f dB, foreground %.2f dB, ssim %.4f\n", m.psnr_base,
+          m.psnr_base_foreground, m.ssim_base);
+  else
+    print("against unmarked     no pixel differs\n");
   if (std::isfinite(m.lpips_base)) print("                     lpips %.4f\n", m.lpips_base);
   print("bit accuracy, blind  %.2f%% per view, 5th percentile %.2f%%, %.3f s per view\n",
         100 * m.accuracy.blind, 100 * m.accuracy_p5, m.blind_seconds);

@@ -159,6 +159,13 @@ TEST_CASE("embedder: a checkpoint of another run is refused") {
   Owner other_key = tiny_owner();
   other_key.key = test_key(6);
   refused(path, other_key, few_steps(6), "found one under another");
+  Owner keyless = tiny_owner();
+  keyless.key.reset();
+  refused(path, keyless, few_steps(6), "expected a checkpoint without a key, found one with a key");
+  Embedder(keyless, tiny_views(), few_steps(6)).save(path);
+  CHECK(!SafetensorsFile::read(path).has("key"));
+  refused(path, owner, few_steps(6), "expected a checkpoint with a key, found one without");
+  embedder.save(path);
   const auto bytes = read_bytes(path);
   write_file_atomically(path, std::span(bytes).first(bytes.size() - 1));
   refused(path, owner, few_steps(6), "");
@@ -167,7 +174,7 @@ TEST_CASE("embedder: a checkpoint of another run is refused") {
   owner.field.save(path);
   CHECK_THROWS_AS(Embedder::checkpoint_key(path), IoError);
   CHECK_THROWS_WITH(Embedder::checkpoint_key(path),
-                    path.string() + ": expected a checkpoint of embed, found no tensor 'key'");
+                    path.string() + ": expected a checkpoint of embed with a key, found no tensor 'key'");
   SafetensorsFile short_key;
   const std::uint8_t bytes_of_key[] = {1, 2, 3};
   short_key.add("key", {3}, std::span<const std::uint8_t>(bytes_of_key));

@@ -107,6 +107,22 @@ TEST_CASE(
   refused({2, cells}, strength, "[cell_grid] strength must be at least 0, got -7");
 }
 
+TEST_CASE("owner: without its key it is saved, loaded, and deals cells under a key that is given") {
+  const TemporaryFolder folder;
+  Owner owner = small_owner();
+  const CellCode dealt = owner.code();
+  const Key key = owner.own_key();
+  owner.key.reset();
+  owner.save(folder / "keyless");
+  CHECK(!SafetensorsFile::read(folder / "keyless").has("key"));
+  Owner again = Owner::load(folder / "keyless");
+  CHECK(!again.key);
+  CHECK_THROWS_WITH(again.code(), "[owner] the owner holds no key (embed --no-key); give one");
+  again.set_code(key, 3);
+  CHECK(again.code().bit == dealt.bit);
+  CHECK(again.code().sign == dealt.sign);
+}
+
 TEST_CASE("owner: saved and loaded it is the same to the byte, and marks the same") {
   const TemporaryFolder folder;
   Owner owner = small_owner();

@@ -51,7 +51,7 @@ Recipients draw_recipients(const watermark::Owner& owner, const TracingBenchOpti
                            std::uint64_t trial) {
   const CounterRng messages(o.seed, 61), names(o.seed, 62);
   const std::string purpose = "bench tracing " + std::to_string(o.seed) + " " + std::to_string(trial);
-  Recipients r{.key = watermark::derive_key(owner.key, purpose, 0),
+  Recipients r{.key = watermark::derive_key(owner.own_key(), purpose, 0),
                .message = watermark::random_message(owner.options().bits, messages, trial)};
   for (Index i = 0; i < o.recipients; ++i) r.names.push_back(std::to_string(i + 1));
   for (std::uint64_t draw = 0; std::ssize(r.guilty) < guilty; ++draw) {

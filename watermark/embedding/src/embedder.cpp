@@ -158,18 +158,21 @@ void Embedder::describe(RunFingerprint& f) const {
 }
 
 void Embedder::save_more(SafetensorsFile& file) const {
-  file.add("key", {32}, std::span<const std::uint8_t>(owner_.key.bytes));
+  if (owner_.key) file.add("key", {32}, std::span<const std::uint8_t>(owner_.key->bytes));
 }
 
 void Embedder::restore_more(const SafetensorsFile& file) {
-  if (file.u8("key") != std::vector<std::uint8_t>(owner_.key.bytes.begin(), owner_.key.bytes.end()))
+  if (file.has("key") != owner_.key.has_value())
+    throw IoError(file.path + ": expected a checkpoint " +
+                  (owner_.key ? "with a key, found one without" : "without a key, found one with a key"));
+  if (owner_.key && key_from_bytes(file.u8("key")) != *owner_.key)
     throw IoError(file.path + ": expected a checkpoint under this key, found one under another");
 }
 
 Key Embedder::checkpoint_key(const std::filesystem::path& path) {
   const SafetensorsFile file = SafetensorsFile::read(path);
   if (!file.has("key"))
-    throw IoError(path.string() + ": expected a checkpoint of embed, found no tensor 'key'");
+    throw IoError(path.string() + ": expected a checkpoint of embed with a key, found no tensor 'key'");
   const std::vector<std::uint8_t> bytes = file.u8("key");
   if (bytes.size() != Key{}.bytes.size())
     throw IoError(path.string() + ": tensor 'key': expected " + std::to_string(Key{}.bytes.size()) +

@@ -41,6 +41,7 @@ std::string configuration(const Owner& owner) {
          {"colours", true},
          {"budget", false},
          {"keyed_signs", true}};
+  if (!owner.key) j["has_key"] = false;
   j.update(Json::parse(owner.mark().configuration()));
   return j.dump();
 }
@@ -93,13 +94,18 @@ double reader_aspect(const nerf::RadianceField& field) {
                     1 / kLeastAspect);
 }
 
-Owner::Owner(nerf::RadianceField base, const OwnerOptions& options, const Key& owner_key, CellGrid grid,
-             const MarkMaker& make)
+Owner::Owner(nerf::RadianceField base, const OwnerOptions& options, const std::optional<Key>& owner_key,
+             CellGrid grid, const MarkMaker& make)
     : field(std::move(base)),
       key(owner_key),
       cells(std::move(grid)),
       options_(checked(options)),
       mark_(make({params, field, cells, options.bits, options.seed})) {}
+
+const Key& Owner::own_key() const {
+  if (!key) throw ValueError("[owner] the owner holds no key (embed --no-key); give one");
+  return *key;
+}
 
 void Owner::set_code(const Key& other, Index bits) {
   const bool any_length = mark_->has_cells();
@@ -134,7 +140,7 @@ void Owner::save(const std::filesystem::path& path) const {
   file.add(dealt_by_area ? kArea : kAreaBesideStrength, {cells.count()}, cells.area());
   if (!dealt_by_area)
     file.add(kStrength, {std::ssize(cells.strength()) / cells.count(), cells.count()}, cells.strength());
-  file.add("key", {32}, std::span<const std::uint8_t>(key.bytes));
+  if (key) file.add("key", {32}, std::span<const std::uint8_t>(key->bytes));
   file.write(path, Access::secret);
 }
 
@@ -148,8 +154,9 @@ Owner Owner::load(const std::filesystem::path& path) {
     nerf::RadianceField field =
         nerf::RadianceField::from_configuration(j.at("field").dump(), place + ": field");
     field.restore(file, "field/");
-    Owner owner(std::move(field), options, key_from_bytes(file.u8("key")), stored_cells(file, j.at("cells")),
-                stored_mark(info.config));
+    std::optional<Key> key;
+    if (j.value("has_key", true)) key = key_from_bytes(file.u8("key"));
+    Owner owner(std::move(field), options, key, stored_cells(file, j.at("cells")), stored_mark(info.config));
     owner.gain = j.at("gain");
     owner.key_free_ = j.value("key_free", false);
     for (const auto& e : owner.params.entries()) {

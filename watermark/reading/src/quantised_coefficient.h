@@ -46,7 +46,7 @@ class LogProduct {
 
  private:
   void take() {
-    sum_ += std::log(product_);
+    sum_ = value();
     product_ = 1;
   }
   double sum_ = 0, product_ = 1;

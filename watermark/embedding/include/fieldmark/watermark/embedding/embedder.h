@@ -59,13 +59,14 @@ class Embedder final : public TrainingRun {
   /// for a mark without a gain.
   void calibrate(Index views = MarkPsnrViews{}.count);
 
-  /// Returns the key of a checkpoint's owner, which a resumed run must use. @throws IoError
+  /// Returns the key of a checkpoint's owner, which a resumed run must use. @throws IoError, also if it holds
+  /// none
   static Key checkpoint_key(const std::filesystem::path& path);
 
  private:
   double take_step(double seconds) override;
   void describe(RunFingerprint& fingerprint) const override;
-  // A checkpoint holds the owner's key: the file is secret, and restoring under another key fails.
+  // A checkpoint holds the owner's key, if it has one: the file is secret, and restoring under another fails.
   void save_more(SafetensorsFile& file) const override;
   void restore_more(const SafetensorsFile& file) override;
   void write(const SafetensorsFile& file, const std::filesystem::path& path) const override {

@@ -68,7 +68,8 @@ struct EmbedRecipe {
   /// Returns the function that makes the mark.
   MarkMaker maker() const;
   /// Makes the owner whose mark the views will train.
-  Owner make(const nerf::RadianceField& field, const Key& key, std::span<const CachedView> cached) const {
+  Owner make(const nerf::RadianceField& field, const std::optional<Key>& key,
+             std::span<const CachedView> cached) const {
     return {field, owner, key, grid(field, cached), maker()};
   }
 };

@@ -2,6 +2,7 @@
 #include <fieldmark/watermark/mark/mark.h>
 
 #include <filesystem>
+#include <optional>
 
 namespace fieldmark::watermark {
 
@@ -23,17 +24,19 @@ struct OwnerOptions {
 /// @return width over height
 double reader_aspect(const nerf::RadianceField& field);
 
-/// The owner's secret: unmarked field, mark, extractor, cells and key.
+/// The owner's secret: unmarked field, mark, extractor, cells and, unless it is kept elsewhere, the key.
 class Owner {
  public:
   /// @param grid  cells of the scene, or message_slots() for a mark without cells
   /// @param make  the mark, see cell_mark() and fusion_mark()
   /// @throws ValueError if an option is out of range or the grid does not suit the mark
-  Owner(nerf::RadianceField base, const OwnerOptions& options, const Key& owner_key, CellGrid grid,
-        const MarkMaker& make);
+  Owner(nerf::RadianceField base, const OwnerOptions& options, const std::optional<Key>& owner_key,
+        CellGrid grid, const MarkMaker& make);
 
-  /// Returns bits and signs of the cells under the owner's key.
-  CellCode code() const { return code(key); }
+  /// Returns the owner's key. @throws ValueError if it holds none
+  const Key& own_key() const;
+  /// Returns bits and signs of the cells under the owner's key. @throws ValueError if it holds none
+  CellCode code() const { return code(own_key()); }
   /// Returns bits and signs of the cells under another key.
   CellCode code(const Key& other) const { return mark_->code(cells, other, options_.bits); }
   /// Sets another key and another message length for the life of this object: the networks of a key-free
@@ -66,7 +69,7 @@ class Owner {
   const OwnerOptions& options() const { return options_; }
 
   nerf::RadianceField field;  ///< unmarked
-  Key key;                    ///< deals the cells
+  std::optional<Key> key;     ///< deals the cells; empty if it is kept elsewhere
   CellGrid cells;             ///< or slots, see message_slots()
   ParamStore<float> params;   ///< of the mark and of its extractor
   double gain = 0;            ///< g, set by calibration; stays 0 for a mark without a gain
