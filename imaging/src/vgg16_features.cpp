@@ -52,16 +52,6 @@ std::size_t layers_in(const SafetensorsFile& file) {
   return count;
 }
 
-// The first layers of other networks, such as SqueezeNet, have the names and shapes of VGG-16's.
-void check_network(const SafetensorsFile& file) {
-  const std::vector<WeightTensor> known = vgg16_tensors();
-  for (const auto& tensor : file.tensors)
-    if (tensor.name.starts_with("features.") &&
-        std::ranges::find(known, tensor.name, &WeightTensor::name) == known.end())
-      throw IoError(file.path + ": expected weights of VGG-16, found tensor " + tensor.name +
-                    " of another network");
-}
-
 }  // namespace
 
 std::vector<WeightTensor> vgg16_tensors() {
@@ -73,7 +63,6 @@ std::vector<WeightTensor> vgg16_tensors() {
 
 template <class T>
 Vgg16Features<T>::Vgg16Features(const SafetensorsFile& file) : normalise_(imagenet<T>()) {
-  check_network(file);
   const std::size_t count = layers_in(file);
   for (std::size_t k = 0; k < count; ++k) convs_.emplace_back(file, kLayers[k].name, options_of(kLayers[k]));
 }

@@ -21,8 +21,7 @@ template <class T>
 class Vgg16Features {
  public:
   /// Reads all 13 convolutions of the file or only the first ones; ignores other tensors (a classifier's).
-  /// @throws IoError if the first is missing, one is missing before one that is present, a shape differs, or
-  /// a tensor features.N is not of VGG-16
+  /// @throws IoError if the first is missing, one is missing before one that is present, or a shape differs
   explicit Vgg16Features(const SafetensorsFile& file);
 
   /// Returns the names of the available depths, shallowest first.
