@@ -71,14 +71,20 @@ void check_library(const Distortion::Step& step) {
   if (step.kind == DistortionKind::jpeg) encode_jpeg(pixel, static_cast<int>(step.amount));
 }
 
+std::string range_of(const Kind& k) {
+  char text[64];
+  std::snprintf(text, sizeof text, "%g to %g%s", k.low, k.high, is_whole(k.kind) ? ", whole" : "");
+  return text;
+}
+
+[[noreturn]] void fail(std::string_view name, const Kind& kind) {
+  throw ValueError("[distortion] name: " + std::string(kind.name) + "_A must have A in " + range_of(kind) +
+                   ", got '" + std::string(name) + "'");
+}
+
 [[noreturn]] void fail(std::string_view name) {
   std::string text = "[distortion] name: must be a chain, separated by commas, of";
-  for (const Kind& k : kKinds) {
-    char range[64];
-    std::snprintf(range, sizeof range, "_A (%g to %g%s), ", k.low, k.high, is_whole(k.kind) ? ", whole" : "");
-    text += " " + std::string(k.name) + range;
-    text.pop_back();
-  }
+  for (const Kind& k : kKinds) text += " " + std::string(k.name) + "_A (" + range_of(k) + "),";
   for (const PlainKind& k : kPlainKinds) text += " " + std::string(k.name) + ",";
   text.pop_back();
   for (const auto& chain : kChains) text += ", " + std::string(chain.first);
@@ -91,13 +97,15 @@ Distortion::Step parse_step(std::string_view name) {
   const std::size_t line = name.find('_');
   const auto kind = std::find_if(kKinds.begin(), kKinds.end(),
                                  [&](const Kind& k) { return k.name == name.substr(0, line); });
-  if (line == std::string_view::npos || kind == kKinds.end()) fail(name);
+  if (kind == kKinds.end()) fail(name);
+  if (line == std::string_view::npos) fail(name, *kind);
   const char *begin = name.data() + line + 1, *end = name.data() + name.size();
   double amount = 0;
   const auto [stop, error] = std::from_chars(begin, end, amount);
   // Written so that NaN fails.
-  if (error != std::errc() || stop != end || !(amount >= kind->low && amount <= kind->high)) fail(name);
-  if (is_whole(kind->kind) && amount != std::floor(amount)) fail(name);
+  if (error != std::errc() || stop != end || !(amount >= kind->low && amount <= kind->high) ||
+      (is_whole(kind->kind) && amount != std::floor(amount)))
+    fail(name, *kind);
   const Distortion::Step step{kind->kind, amount};
   check_library(step);
   return step;

@@ -132,11 +132,16 @@ void bind_marks(py::module_& module) {
             return o.mark().has_gain() ? std::optional(o.options().mark_psnr) : std::nullopt;
           },
           "PSNR of marked to unmarked renders in dB; None for a mark whose networks decide it.")
-      .def_property(
-          "key", [](const Owner& o) { return o.key; },
-          [](Owner& o, const Key& key) { o.set_code(key, o.options().bits); },
-          "The secret key, None if the file holds none; another may be set, which is not saved unless\n"
-          "save() is called.")
+      .def_property_readonly(
+          "key", [](const Owner& o) { return o.key; }, "The secret key; None if the file holds none.")
+      .def(
+          "with_key",
+          [](const Owner& o, const Key& key) {
+            auto other = std::make_shared<Owner>(o);
+            other->set_code(key, o.options().bits);
+            return other;
+          },
+          "key"_a, "Returns the same owner with another key.")
       .def_property_readonly(
           "key_free", &Owner::key_free,
           "True if the networks were trained under random codes and know no key; False for owners\n"

@@ -261,13 +261,14 @@ def test_two_threads_use_one_field(field):
 
 
 def test_an_owner_takes_another_key(owner, tmp_path):
+    key, before = fm.Key.random(), owner.key
+    other = owner.with_key(key)
+    assert other.key == key and owner.key == before != key
+    other.with_key(before).save(tmp_path / "again.fm")
     owner.save(tmp_path / "owner.fm")
-    again = fm.Owner.load(tmp_path / "owner.fm")
-    key = fm.Key.random()
-    again.key = key
-    assert again.key == key and again.key != owner.key
+    assert (tmp_path / "again.fm").read_bytes() == (tmp_path / "owner.fm").read_bytes()
     with pytest.raises(TypeError):
-        again.key = None
+        owner.with_key(None)
 
 
 def test_a_key_is_kept_and_not_shown(tmp_path):

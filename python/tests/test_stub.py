@@ -36,8 +36,7 @@ def members(name):
 
 
 def is_property(node):
-    return any(isinstance(d, ast.Name) and d.id == "property" or isinstance(d, ast.Attribute) and d.attr == "setter"
-               for d in node.decorator_list)
+    return any(isinstance(d, ast.Name) and d.id == "property" for d in node.decorator_list)
 
 
 def signature(node):

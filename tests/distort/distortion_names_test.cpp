@@ -20,6 +20,12 @@ TEST_CASE("distortion names: wrong names list the right ones") {
       "letterbox, "
       "background_black, background_white, background_grey, background_green, background_noise, "
       "background_shapes, caption, collage, combined, screenshot, got 'sharpen_1'");
+  CHECK_THROWS_WITH(parse_distortion("blur_1,noise_2"),
+                    "[distortion] name: noise_A must have A in 0 to 1, got 'noise_2'");
+  CHECK_THROWS_WITH(parse_distortion("jpeg_50.5"),
+                    "[distortion] name: jpeg_A must have A in 1 to 100, whole, got 'jpeg_50.5'");
+  CHECK_THROWS_WITH(parse_distortion("part"),
+                    "[distortion] name: part_A must have A in 0.05 to 1, got 'part'");
   for (const char* bad : {"",
                           "noise",
                           "noise_",

@@ -33,10 +33,23 @@ TEST_CASE("A wrong command or option is answered with the nearest one", "[cli]")
         "fieldmark: no command is called 'gradchek'; did you mean gradcheck? (see fieldmark --help)\n");
   const auto option = run_command({"gradcheck", "--sed", "3"});
   CHECK(option.code == cli::kUsage);
-  CHECK_THAT(option.err, Contains("gradcheck has no option --sed; did you mean --seed?"));
+  CHECK_THAT(option.err,
+             Contains("gradcheck: no option is called --sed; did you mean --seed? (see fieldmark gradcheck"));
   const auto with_value = run_command({"gradcheck", "--thread=2"});
   CHECK(with_value.code == cli::kUsage);
   CHECK_THAT(with_value.err, Contains("--thread; did you mean --threads?"));
+  const auto second = run_command({"data", "ftch", "lego"});
+  CHECK(second.code == cli::kUsage);
+  CHECK(second.err ==
+        "fieldmark: data: no command is called 'ftch'; did you mean fetch? (see fieldmark data --help)\n");
+  const auto its_option = run_command({"bench", "tracing", "--ownr", "o"});
+  CHECK(its_option.err ==
+        "fieldmark: bench tracing: no option is called --ownr; did you mean --owner? (see fieldmark bench "
+        "tracing "
+        "--help)\n");
+  const auto nested = run_command({"data", "fetch"});
+  CHECK(nested.code == cli::kUsage);
+  CHECK_THAT(nested.err, Contains("(see fieldmark data fetch --help)"));
   const auto far = run_command({"zzzzzz"});
   CHECK(far.code == cli::kUsage);
   CHECK(far.err.find("did you mean") == std::string::npos);

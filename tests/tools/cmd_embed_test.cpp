@@ -106,7 +106,7 @@ TEST_CASE("embed --no-key writes the same bytes for any key, and reading then ne
                               {"--key", test_key_file(job.folder, key), "--no-key", "--measured-views", "1"});
     INFO(r.err);
     REQUIRE(r.code == cli::kOk);
-    CHECK_THAT(r.out + r.err, Contains("without the key, keep it secret"));
+    CHECK_THAT(r.out + r.err, Contains("holds no key: keep the file and the key secret"));
     return owner;
   };
   const std::string one = embedded(7), other = embedded(9);
@@ -184,7 +184,7 @@ TEST_CASE("embed has cells as fine as its views and message need, unless they ar
     return watermark::Owner::load(owner).cells.side();
   };
   const Index few = cells_of("4", {});
-  CHECK(few == 40);  // the views show 300 cells and more
+  CHECK(few == 40);  // the views never show 400 cells
   CHECK(cells_of("200", {}) > few);
   CHECK(cells_of("100", {"--cells", "14"}) == 14);
 }

@@ -64,6 +64,14 @@ TEST_CASE("reproduce measures what is missing on the built-in scene, once", "[re
   CHECK(second.code == cli::kOk);
   CHECK_THAT(second.err, Contains("0 of 2 cells are missing\n"));
   CHECK(read_text(folder / "cells/ours-objects-hash-8-1.json") == kept);
+  CHECK_THAT(second.err, Contains("cells of other budgets are kept, 1;"));
+
+  std::vector<std::string> other = line;
+  *std::ranges::find(other, "0.1") = "0.2";
+  const auto kept_cells = run_command(other);
+  CHECK(kept_cells.code == cli::kOk);
+  CHECK_THAT(kept_cells.err, Contains("cells of other budgets are kept, 2; for cells of 0.2 s name another "
+                                      "folder with --cells"));
 
   std::vector<std::string> longer = line;
   *std::ranges::find(longer, (folder / "cells").string()) = folder / "cells/longer";
@@ -142,10 +150,10 @@ TEST_CASE("reproduce says what is wrong", "[reproduce]") {
   const TemporaryFolder folder;
   const auto table = run_command({"reproduce", "--table", "best", "--cells", folder / "cells"});
   CHECK(table.code == cli::kUsage);
-  CHECK_THAT(table.err, Contains("--table: [paper_table] name must be bits, quality"));
+  CHECK_THAT(table.err, Contains("--table: name must be bits, quality"));
   const auto system = run_command({"reproduce", "--system", "theirs", "--cells", folder / "cells"});
   CHECK(system.code == cli::kUsage);
-  CHECK_THAT(system.err, Contains("--system: [paper_system] name must be one of ours, copyrnerf_paper"));
+  CHECK_THAT(system.err, Contains("--system: name must be one of ours, copyrnerf_paper"));
   const auto scene = run_command({"reproduce", "--table", "weights", "--scene", folder / "nowhere", "--cells",
                                   folder / "cells", "--work", folder / "work", "--lpips-weights", "none"});
   CHECK(scene.code == cli::kFailed);

@@ -48,7 +48,7 @@ TEST_CASE("code_option: a message of other digits sets the length, and says so, 
   CHECK(choose({.key = "", .copy = "", .bits = 6}, "a5", owner).notes.empty());
   CHECK(owner.options().bits == 6);
   CHECK_THROWS_WITH(choose({.key = "", .copy = "", .bits = 1000}, "", owner),
-                    Contains("--bits: [owner] bits must be 1 to"));
+                    Contains("--bits: bits must be 1 to"));
   Owner paper = small_paper_owner();
   CHECK(choose({}, "a5", paper).notes.empty());  // message_of() reports what is wrong with it
   CHECK(paper.options().bits == 3);
@@ -74,6 +74,12 @@ TEST_CASE("code_option: an owner without a key needs one") {
   CHECK_THROWS_WITH(choose({}, "", owner), Contains("--key: OWNER holds no key"));
   CHECK(choose({.key = folder / "key", .copy = "", .bits = 0}, "", owner).key == test_key(5));
   CHECK(owner.key == test_key(5));
+  owner.key.reset();
+  owner.save(folder / "owner");
+  std::ostringstream out, err;
+  cli::Context context({}, {}, out, err);
+  CHECK_THROWS_AS(cli::keyed_owner(folder / "owner", "", context), cli::UsageError);
+  CHECK(cli::keyed_owner(folder / "owner", folder / "key", context).key == test_key(5));
 }
 
 TEST_CASE("code_option: an owner of version 0.1 comes with a line on its bound") {

@@ -31,9 +31,10 @@ TEST_CASE("outputs: a secret is never replaced, a field by fields alone") {
   watermark::save_key(folder / "a.key", watermark::random_key());
   write_model(folder / "owner", "owner", "w");
   write_model(folder / "checkpoint", "training", "key");
+  write_model(folder / "run.checkpoint", "checkpoint", "w");
   write_model(folder / "field", "field", "w");
   write_file_atomically(folder / "text", "text");
-  for (const char* name : {"a.key", "owner", "checkpoint"}) {
+  for (const char* name : {"a.key", "owner", "checkpoint", "run.checkpoint"}) {
     const auto before = read_bytes(folder / name);
     CHECK_THROWS_WITH(check_writable(folder / name),
                       Contains(std::string(name) + ": exists already") && Contains("name another file"));
@@ -52,6 +53,10 @@ TEST_CASE("outputs: a secret is never replaced, a field by fields alone") {
   CHECK(!fs::exists(folder / "new"));
   CHECK_THROWS_WITH(check_writable(folder.path), Contains("found a folder; name a file"));
   CHECK_THROWS_AS(check_writable(folder / "missing/file"), IoError);
+  CHECK_THROWS_WITH(check_writable_page(folder / "missing/file"),
+                    Contains("missing/file: its folder") && Contains("missing does not exist; create it"));
+  CHECK_THROWS_WITH(check_writable(folder / "view.PNG"),
+                    Contains("view.PNG: has the name of an image; name another file"));
   CHECK_NOTHROW(check_writable("/dev/null"));
 }
 

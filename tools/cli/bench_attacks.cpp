@@ -8,9 +8,9 @@
 #include <optional>
 
 #include "cli/bench.h"
+#include "cli/code_option.h"
 #include "cli/measured.h"
 #include "cli/message_option.h"
-#include "cli/owner_note.h"
 
 namespace fieldmark::cli {
 namespace {
@@ -19,7 +19,7 @@ using watermark::AttackRow;
 using Names = std::vector<std::string>;
 
 struct BenchAttacksArguments {
-  std::string owner, field, other, onto, cameras = "novel", plot;
+  std::string owner, key, field, other, onto, cameras = "novel", plot;
   MessageOption message;  // baked into the field
   Names attacked;         // files derived from the field by other means
   Index count = 50, size = 0;
@@ -27,18 +27,12 @@ struct BenchAttacksArguments {
   bool quick = false;
 };
 
-watermark::Owner noted_owner(const std::string& path, Context& context) {
-  auto owner = watermark::Owner::load(path);
-  note_unproven_bound(owner, context);
-  return owner;
-}
-
 class Bench {
  public:
   Bench(const BenchAttacksArguments& options, Context& context)
       : options_(options),
         context_(context),
-        owner_(noted_owner(options.owner, context)),
+        owner_(keyed_owner(options.owner, options.key, context)),
         message_(message_of(options.message, owner_.options().bits)),
         marked_(nerf::RadianceField::load(options.field)),
         progress_(new Progress(context.progress("none"))),  // the meter begins with the views themselves
@@ -173,6 +167,7 @@ Command add_bench_attacks(CommandLine& app) {
   auto o = std::make_shared<BenchAttacksArguments>();
   add_file(app, "--field", o->field, "Baked field to attack", "FIELD")->required();
   add_file(app, "--owner", o->owner, "Owner file from `fieldmark embed`", "OWNER")->required();
+  add_key_option(app, o->key);
   add_message_options(app, o->message, "Message baked into --field");
   add_file(app, "--other", o->other,
            "Field baked for another copy or message, to average with; default: no such row", "FIELD");
@@ -199,7 +194,7 @@ Command add_bench_attacks(CommandLine& app) {
   add_plot(app, o->plot);
   app.add_flag("--quick", o->quick, "Measure one severity of each attack");
   return [o](Context& context) {
-    if (!o->message.given()) throw UsageError("bench attacks: needs the --message baked into --field");
+    if (!o->message.given()) throw UsageError("the --message baked into --field is needed");
     return run_bench_attacks(*o, context);
   };
 }

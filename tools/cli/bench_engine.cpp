@@ -103,7 +103,7 @@ Scene scene_of(const BenchEngineArguments& options) {
 bench::EngineBench measured(const BenchEngineArguments& options, Context& context) {
   const InterruptGuard guard;
   try {
-    return read_option("bench engine", [&] {
+    return read_option("options", [&] {
       return with_progress(
           context, [&](const auto& progress) { return bench::run_engine_bench(options.engine, progress); });
     });

@@ -16,7 +16,7 @@ constexpr const char* kColumns =
     "smallest of an innocent one, over all repetitions; innocents_named: innocent recipients found";
 
 struct BenchTracingArguments {
-  std::string owner;
+  std::string owner, key;
   bool blind = false;
   bench::TracingBenchOptions options;
 };
@@ -37,9 +37,8 @@ Json tracing_row_json(const bench::TracingRow& r) {
 }
 
 int run_bench_tracing(const BenchTracingArguments& o, Context& context) {
-  const auto owner = watermark::Owner::load(o.owner);
+  const auto owner = keyed_owner(o.owner, o.key, context);
   check_copies(owner);
-  note_unproven_bound(owner, context);
   bench::TracingBenchOptions options = o.options;
   options.informed = !o.blind;
   options.seed = context.seed();
@@ -77,6 +76,7 @@ int run_bench_tracing(const BenchTracingArguments& o, Context& context) {
 Command add_bench_tracing(CommandLine& app) {
   auto o = std::make_shared<BenchTracingArguments>();
   app.add_option("--owner", o->owner, "Owner file from `fieldmark embed`")->required()->type_name("OWNER");
+  add_key_option(app, o->key);
   add_number(app, "--recipients", o->options.recipients, 9, 10000000, "Recipients to test, 9 to 10000000");
   add_number(app, "--repetitions", o->options.repetitions, 1, 100000,
              "Repetitions of each case with another key, 1 to 100000");

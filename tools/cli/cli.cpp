@@ -152,9 +152,12 @@ class Program {
   }
 
   int usage(const std::string& what) {
-    std::string name;
-    for (auto& [sub, command] : subcommands_)
-      if (sub->parsed()) name = " " + sub->get_name();
+    std::string name = called_;
+    for (const auto& [sub, command] : subcommands_) {
+      if (!sub->parsed()) continue;
+      name = " " + sub->get_name();
+      for (const CLI::App* nested : sub->get_subcommands()) name += " " + nested->get_name();
+    }
     err_ << "fieldmark:" << (name.empty() ? "" : name + ":") << " " << what << " (see fieldmark" << name
          << " --help)\n";
     return kUsage;
@@ -170,9 +173,20 @@ class Program {
       names.push_back(known.app->get_name());
       if (names.back() == line[1]) sub = known.app;
     }
+    if (sub) called_ = " " + line[1];
     if (!sub) return "no command is called '" + line[1] + "'" + did_you_mean(line[1], names);
-    names.clear();
     std::vector<const CLI::App*> apps = sub->get_subcommands(nullptr);  // `data fetch` has options of its own
+    names.clear();
+    for (const CLI::App* nested : apps) names.push_back(nested->get_name());
+    if (line.size() > 2 && !line[2].starts_with("-") && !names.empty() && !std::ranges::count(names, line[2]))
+      return "no command is called '" + line[2] + "'" + did_you_mean(line[2], names);
+    names.clear();
+    const auto nested = std::ranges::find_if(
+        apps, [&](const CLI::App* app) { return line.size() > 2 && app->get_name() == line[2]; });
+    if (nested != apps.end()) {
+      called_ += " " + line[2];
+      apps = {*nested};
+    }
     apps.push_back(sub);
     for (const CLI::App* app : apps)
       for (const CLI::Option* option : app->get_options())
@@ -183,7 +197,7 @@ class Program {
       if (word.starts_with("--") && line[i].size() == word.size() + 1)
         return word + ": expected a value behind =, got an empty one";
       if (!word.starts_with("--") || std::find(names.begin(), names.end(), word) != names.end()) continue;
-      return line[1] + " has no option " + word + did_you_mean(word, names);
+      return "no option is called " + word + did_you_mean(word, names);
     }
     return "";
   }
@@ -194,6 +208,7 @@ class Program {
   }
 
   std::ostream &out_, &err_;
+  std::string called_;  // " NAME" of a known command
   CommonOptions common_;
   CLI::App app_{
       "Watermarks radiance fields, so that owners can prove from any rendered image that a field is theirs."};
@@ -223,6 +238,11 @@ int run_guarded(const std::vector<std::string>& line, std::ostream& out, std::os
 }
 
 }  // namespace
+
+std::string without_function(const std::string& what) {
+  const std::size_t end = what.find("] ");
+  return what.starts_with("[") && end != std::string::npos ? what.substr(end + 2) : what;
+}
 
 int run(int argc, const char* const* argv, std::ostream& out, std::ostream& err) noexcept try {
   return run_guarded({argv, argv + argc}, out, err);

@@ -113,7 +113,7 @@ Command add_attack_field(CommandLine& app) {
                  "By training, one at a time:\n"
                  "finetune         continues training with the clean images of --data\n"
                  "finetune-renders continues training with renders of the field\n"
-                 "remove           continues training with renders changed against the extractor of --owner\n"
+                 "remove           continues training with renders changed against --owner's extractor\n"
                  "retrain          trains a new field with renders of this one")
       ->required()
       ->type_name("NAME[,NAME...]");

@@ -45,6 +45,9 @@ struct EmbedArguments {
 
 // Returns the key. A run that started without --key made one and stored it in its checkpoint.
 watermark::Key key_of(const EmbedArguments& options, const std::string& checkpoint) {
+  if (options.resume && options.no_key == SafetensorsFile::read(checkpoint).has("key"))
+    throw UsageError(options.no_key ? "--no-key: the interrupted run kept its key; resume without this option"
+                                    : "--resume: the interrupted run had --no-key; repeat it and its --key");
   if (!options.key.empty()) return watermark::load_key(options.key);
   if (options.resume) return watermark::Embedder::checkpoint_key(checkpoint);
   return watermark::random_key();
@@ -190,8 +193,8 @@ int run_embed(const EmbedArguments& options, Context& context) {
   const auto sha256 = sha256_file_hex(options.out);
   const auto open = to_hex(watermark::public_key(key));
   context.text() << options.out << ": " << embedder.steps() << " steps in " << format_duration(seconds)
-                 << (options.no_key ? ", without the key" : "") << ", keep it secret\nsha256 " << sha256
-                 << "\npublic key " << open << "\n"
+                 << (options.no_key ? ", holds no key: keep the file and the key secret" : ", keep it secret")
+                 << "\nsha256 " << sha256 << "\npublic key " << open << "\n"
                  << image << ": unmarked, marked, ten times the difference\n";
   Json commitment = nullptr;
   if (intended) {
@@ -298,7 +301,7 @@ Command add_embed(CommandLine& app) {
       ->default_str("");
   app.add_option(
          "--cells", o->cells,
-         "Cells per axis of the scene's cube, 2 to 64; default: so many that nine of ten views show 300 "
+         "Cells per axis of the scene's cube, 2 to 64; default: so many that nine of ten views show 400 "
          "cells and two per bit, in scenes of type place eight per bit; for preset fast")
       ->range(2, 64)
       ->type_name("N")

@@ -1,5 +1,4 @@
 #include <fieldmark/core/digest.h>
-#include <fieldmark/core/files.h>
 #include <fieldmark/watermark/keys/signing.h>
 
 #include <filesystem>
@@ -9,6 +8,7 @@
 #include "cli/cli.h"
 #include "cli/commands.h"
 #include "cli/context.h"
+#include "cli/outputs.h"
 
 namespace fieldmark::cli {
 namespace {
@@ -23,7 +23,7 @@ int run_key(const KeyArguments& options, Context& context) {
   if (std::filesystem::exists(options.out) && !options.force)
     throw IoError(options.out +
                   ": exists already; --force replaces it, and proofs with the old key are lost");
-  AtomicFile{options.out};
+  check_place(options.out);
   if (std::filesystem::exists(options.out)) watermark::load_key(options.out);  // throws unless it is a key
   const auto key = watermark::random_key();
   watermark::save_key(options.out, key);

@@ -109,6 +109,18 @@ double seconds_of_a_cell(const std::vector<baselines::Cell>& cells, double budge
   return count > 0 ? sum / count : 1.5 * budget;
 }
 
+// A cell that is there counts as measured, whatever its budget.
+void note_other_budgets(const std::vector<baselines::CellName>& wanted,
+                        const std::vector<baselines::Cell>& found, double budget, Context& context) {
+  const auto other = std::ranges::count_if(found, [&](const baselines::Cell& c) {
+    return c.more.contains("budget") && c.more.at("budget") != budget &&
+           std::ranges::count(wanted, c.name) > 0;
+  });
+  if (other > 0)
+    context.note("cells of other budgets are kept, " + std::to_string(other) + "; for cells of " +
+                 results::shown(budget) + " s name another folder with --cells");
+}
+
 // The folder of the page's cells, and the subfolder of it, with a slash, in which this run's cells are.
 struct CellsFolder {
   std::filesystem::path path;
@@ -229,13 +241,15 @@ int run_reproduce(const ReproduceArguments& options, Context& context) {
   const auto page = page_of(options, context);
   check_writable_page(page.string());
   auto missing = missing_of(cells, options.cells);
-  const double each = seconds_of_a_cell(baselines::load_cells(options.cells), options.budget);
+  const auto found = baselines::load_cells(options.cells);
+  const double each = seconds_of_a_cell(found, options.budget);
   context.text() << missing.size() << " of " << cells.size() << " cells are missing";
   if (!missing.empty())
     context.text() << ", about " << format_duration(each * static_cast<double>(missing.size()));
   context.text() << "\n";
   for (const auto& name : missing) context.text() << "  " << name.stem() << "\n";
   if (!options.report_only) {
+    note_other_budgets(cells, found, options.budget, context);
     measure(options, scenes, missing, context);
     missing = missing_of(cells, options.cells);
   }

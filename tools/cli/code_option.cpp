@@ -22,10 +22,20 @@ Index message_bits(const CodeOption& options, const std::string& hex, const wate
   return digits * kDigitBits;
 }
 
+watermark::Key chosen_key(const std::string& file, const watermark::Owner& owner) {
+  if (file.empty() && !owner.key)
+    throw UsageError("--key: OWNER holds no key (embed --no-key); give one, for reading that of `bake`");
+  return file.empty() ? owner.own_key() : watermark::load_key(file);
+}
+
 }  // namespace
 
+void add_key_option(CommandLine& app, std::string& key) {
+  app.add_option("--key", key, "Key from `fieldmark key`; default: that of OWNER")->type_name("KEY");
+}
+
 void add_code_options(CommandLine& app, CodeOption& o) {
-  app.add_option("--key", o.key, "Key from `fieldmark key`; default: that of OWNER")->type_name("KEY");
+  add_key_option(app, o.key);
   app.add_option(
          "--bits", o.bits,
          "Length of the message in bits, 1 to the number of cells, for presets paper and code as embedded;\n"
@@ -42,15 +52,20 @@ void add_copy_option(CommandLine& app, CodeOption& o, const std::string& purpose
 watermark::Key choose_code(const CodeOption& options, const MessageOption& message, watermark::Owner& owner,
                            Context& context) {
   if (!options.copy.empty()) check_copies(owner);
-  if (options.key.empty() && !owner.key)
-    throw UsageError("--key: OWNER holds no key (embed --no-key); give the one that it was made for");
-  const watermark::Key key = options.key.empty() ? owner.own_key() : watermark::load_key(options.key);
+  const watermark::Key key = chosen_key(options.key, owner);
   const Index bits = message_bits(options, message.message, owner, context);
   read_option(options.bits > 0 ? "--bits" : "--message", [&] {
     owner.set_code(options.copy.empty() ? key : watermark::copy_key(key, options.copy), bits);
   });
   note_unproven_bound(owner, context);
   return key;
+}
+
+watermark::Owner keyed_owner(const std::string& path, const std::string& key, Context& context) {
+  auto owner = watermark::Owner::load(path);
+  owner.set_code(chosen_key(key, owner), owner.options().bits);
+  note_unproven_bound(owner, context);
+  return owner;
 }
 
 void check_copies(const watermark::Owner& owner) {

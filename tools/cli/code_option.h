@@ -15,6 +15,8 @@ struct CodeOption {
   Index bits = 0;  ///< 0: length of the message, or of the owner
 };
 
+/// Adds --key.
+void add_key_option(CommandLine& app, std::string& key);
 /// Adds --key and --bits.
 void add_code_options(CommandLine& app, CodeOption& options);
 /// Adds --copy. @param purpose  begins the help text: "Recipient ..."
@@ -27,6 +29,11 @@ void add_copy_option(CommandLine& app, CodeOption& options, const std::string& p
 /// @throws UsageError if the owner's cells cannot hold the message, or no key is given and the owner has none
 watermark::Key choose_code(const CodeOption& options, const MessageOption& message, watermark::Owner& owner,
                            Context& context);
+
+/// Reads an owner file and gives the owner the key of a file, unless that is empty. Also calls
+/// note_unproven_bound().
+/// @throws UsageError if the owner then has no key
+watermark::Owner keyed_owner(const std::string& path, const std::string& key, Context& context);
 
 /// @throws UsageError if the owner's mark has no cells, so that its copies have no codes of their own
 void check_copies(const watermark::Owner& owner);

@@ -7,7 +7,7 @@
 #include <vector>
 
 // The options of a command, based on CLI11. That header costs each source that includes it ten seconds of
-// compile time, so only command_line.cpp and cli.cpp include it.
+// compile time, so only command_line.cpp, cli.cpp and wrapped_help include it.
 namespace CLI {
 class App;
 class Option;

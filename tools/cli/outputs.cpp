@@ -4,6 +4,7 @@
 #include <fieldmark/core/error.h>
 #include <fieldmark/core/files.h>
 #include <fieldmark/engine/model_file.h>
+#include <fieldmark/imaging/image_format.h>
 
 #include <algorithm>
 #include <cctype>
@@ -40,8 +41,8 @@ std::optional<Model> model_at(const std::string& path) {
     const auto file = SafetensorsFile::read(path);
     if (!file.metadata.contains("fieldmark")) return std::nullopt;
     const std::string kind = model_info(file).kind;
-    // A checkpoint of embed holds the owner's key.
-    return Model{kind, kind == "owner" || file.has("key")};
+    // Whoever replaces a checkpoint loses the work of an interrupted run, and maybe the only copy of a key.
+    return Model{kind, kind == "owner" || kind == "checkpoint" || file.has("key")};
   } catch (const Error&) {
     return Model{"damaged or later model", true};
   }
@@ -66,13 +67,23 @@ bool same_file(const fs::path& a, const fs::path& b) {
   return !a.empty() && !b.empty() && fs::weakly_canonical(a, ignored) == fs::weakly_canonical(b, ignored);
 }
 
-void check_writable(const std::string& path) {
+void check_place(const std::string& path) {
+  const fs::path folder = fs::path(path).parent_path();
+  std::error_code none;
+  if (!folder.empty() && fs::status(folder, none).type() == fs::file_type::not_found)
+    throw IoError(path + ": its folder " + folder.string() +
+                  " does not exist; create it, or name another file");
   AtomicFile{path};
+}
+
+void check_writable(const std::string& path) {
+  if (has_image_extension(path)) throw IoError(path + ": has the name of an image; name another file");
+  check_place(path);
   if (const auto model = model_at(path); model && model->secret) refuse(path, *model);
 }
 
 void check_new_checkpoint(const std::string& path) {
-  AtomicFile{path};
+  check_place(path);
   if (fs::exists(path))
     throw IoError(path +
                   ": exists already, and the work of an interrupted run would be lost; continue it with "
@@ -80,7 +91,7 @@ void check_new_checkpoint(const std::string& path) {
 }
 
 void check_writable_page(const std::string& path) {
-  AtomicFile{path};
+  check_place(path);
   if (const auto model = model_at(path)) refuse(path, *model);
 }
 

@@ -8,8 +8,13 @@ namespace fieldmark::cli {
 /// True if two paths, which may not exist yet, name one file.
 bool same_file(const std::filesystem::path& a, const std::filesystem::path& b);
 
-/// Checks an output before the work begins: it is writable, is not a folder, and replaces no secret, that is,
-/// no file with a key or an owner's networks. Leaves an existing file untouched.
+/// Checks before the work begins that a file can be written: it is no folder, and its folder exists.
+/// @throws IoError naming the file and what to do
+void check_place(const std::string& path);
+
+/// Checks the place of a model before the work begins: it is writable, is not a folder, has no name of an
+/// image, and replaces neither a secret, that is, a file with a key or an owner's networks, nor a checkpoint.
+/// Leaves an existing file untouched.
 /// @throws IoError naming the file and what to do
 void check_writable(const std::string& path);
 
@@ -17,7 +22,7 @@ void check_writable(const std::string& path);
 /// @throws IoError naming the file and what to do
 void check_new_checkpoint(const std::string& path);
 
-/// As check_writable(), for text and images, which must not replace a field or checkpoint either.
+/// As check_writable(), for text and images, which must not replace a field either.
 void check_writable_page(const std::string& path);
 
 /// Returns the images that a folder for outputs holds already. Among new ones they would be mistaken for the

@@ -1,9 +1,25 @@
 #include "cli/wrapped_help.h"
 
 #include <algorithm>
-#include <sstream>
 
 namespace fieldmark::cli {
+namespace {
+
+// Returns a name with its description beside it, or below a name that is too long.
+std::string columns(const std::string& name, const std::string& description) {
+  constexpr std::size_t kColumn = WrappedHelp::kDescription;
+  const std::string indent(kColumn, ' ');
+  std::string out = "  " + name;
+  if (description.empty()) return out + "\n";
+  out += out.size() < kColumn ? indent.substr(out.size()) : "\n" + indent;
+  for (const char c : wrapped(description, WrappedHelp::kWidth - kColumn)) {
+    out += c;
+    if (c == '\n') out += indent;
+  }
+  return out + "\n";
+}
+
+}  // namespace
 
 std::string wrapped(const std::string& text, std::size_t width) {
   std::string out;
@@ -25,15 +41,13 @@ std::string wrapped(const std::string& text, std::size_t width) {
   }
 }
 
-std::string WrappedHelp::make_option_desc(const CLI::Option* option) const {
-  return wrapped(CLI::Formatter::make_option_desc(option), kWidth - kDescription);
+std::string WrappedHelp::make_option(const CLI::Option* option, bool is_positional) const {
+  return columns(make_option_name(option, is_positional) + make_option_opts(option),
+                 make_option_desc(option));
 }
 
 std::string WrappedHelp::make_subcommand(const CLI::App* command) const {
-  std::ostringstream out;
-  CLI::detail::format_help(out, command->get_display_name(true),
-                           wrapped(command->get_description(), kWidth - kDescription), kDescription);
-  return out.str();
+  return columns(command->get_display_name(true), command->get_description());
 }
 
 }  // namespace fieldmark::cli

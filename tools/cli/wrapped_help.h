@@ -1,6 +1,5 @@
 #pragma once
 #include <CLI/CLI.hpp>
-
 #include <string>
 
 namespace fieldmark::cli {
@@ -15,8 +14,7 @@ class WrappedHelp : public CLI::Formatter {
  public:
   static constexpr std::size_t kWidth = 120;       ///< columns of a line
   static constexpr std::size_t kDescription = 34;  ///< column at which descriptions begin
-  WrappedHelp() { column_width(kDescription); }
-  std::string make_option_desc(const CLI::Option* option) const override;
+  std::string make_option(const CLI::Option* option, bool is_positional) const override;
   std::string make_subcommand(const CLI::App* command) const override;
 };
 

@@ -81,6 +81,8 @@ TEST_CASE("field_attack: names, chains and what is wrong with others") {
                     "10), prune_A (0 to 1), hue_A (-360 to 360), brightness_A (0.01 to 100), contrast_A (0 "
                     "to 10), average_A (0 to 1), sign_flip_A (0 to 4), copy_A (-4 to 4), greyscale, "
                     "float16, int2 to int8, int2-blocks to int8-blocks, got 'int9'");
+  CHECK_THROWS_WITH(parse_field_attack("prune_1.5"),
+                    "[field_attack] name: prune_A must have A in 0 to 1, got 'prune_1.5'");
   for (const char* bad : {"", "weights_noise", "weights_noise_", "weights_noise_-1", "weights_noise_nan",
                           "int1", "int8_2", "int8-", "float16,", "float16_1", "prune_1.5", "copy"})
     CHECK_THROWS_AS(parse_field_attack(bad), ValueError);

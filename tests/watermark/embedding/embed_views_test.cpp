@@ -237,11 +237,11 @@ TEST_CASE("embed_views: cells are as fine as a message and a proof need, and no 
   CHECK(cells_for_message({}, 1, object) == 64);
   const std::vector few(3, row_of_cells({1, 1}));
   CHECK(cells_for_message(few, 1, object) == 40);
-  wall.weight.resize(32 * 64);  // half of it: 128 cells of 16 an axis, about 242 of 22
+  wall.weight.resize(32 * 64);  // half of it: 128 cells of 16 an axis, about 392 of 28
   wall.position.resize(3 * 32 * 64);
   const std::vector half(3, wall);
-  CHECK(cells_shown(half, 22) < 300);
-  CHECK(cells_for_message(half, 1, object) == 28);
-  CHECK(cells_for_message(half, 1, nerf::SpaceKind::ndc) == 28);
+  CHECK(cells_shown(half, 28) < 400);
+  CHECK(cells_for_message(half, 1, object) == 34);
+  CHECK(cells_for_message(half, 1, nerf::SpaceKind::ndc) == 34);
   CHECK(cells_for_message(half, 1, cut) == 16);
 }

@@ -34,13 +34,20 @@ constexpr std::array<Named, 8> kAmounts{{{"weights_noise", Kind::weights_noise, 
                                          {"sign_flip", Kind::sign_flip, 0, 4},
                                          {"copy", Kind::copy, -4, 4}}};
 
+std::string range_of(const Named& k) {
+  char text[64];
+  std::snprintf(text, sizeof text, "%g to %g", k.low, k.high);
+  return text;
+}
+
+[[noreturn]] void fail(std::string_view name, const Named& k) {
+  throw ValueError("[field_attack] name: " + std::string(k.name) + "_A must have A in " + range_of(k) +
+                   ", got '" + std::string(name) + "'");
+}
+
 [[noreturn]] void fail(std::string_view name) {
   std::string text = "[field_attack] name: must be a chain, separated by commas, of";
-  for (const Named& k : kAmounts) {
-    char range[64];
-    std::snprintf(range, sizeof range, "_A (%g to %g),", k.low, k.high);
-    text += " " + std::string(k.name) + range;
-  }
+  for (const Named& k : kAmounts) text += " " + std::string(k.name) + "_A (" + range_of(k) + "),";
   throw ValueError(text + " greyscale, float16, int2 to int8, int2-blocks to int8-blocks, got '" +
                    std::string(name) + "'");
 }
@@ -61,7 +68,8 @@ FieldAttack::Step parse_step(std::string_view name) {
   double amount = 0;
   const auto [stop, error] = std::from_chars(begin, end, amount);
   // Written so that NaN fails.
-  if (error != std::errc() || stop != end || !(amount >= kind->low && amount <= kind->high)) fail(name);
+  if (error != std::errc() || stop != end || !(amount >= kind->low && amount <= kind->high))
+    fail(name, *kind);
   return {kind->kind, amount};
 }
 

@@ -14,8 +14,8 @@ constexpr Index kCoarsest = 4;        // side of the patch over the smallest sid
 constexpr Index kParts = 4;           // per ray where it passes through more than a surface
 constexpr Index kFewestCells = 16, kMostCells = 64, kMoreCells = 6;
 constexpr double kCellsABit = 2, kCellsABitOfACut = 8, kPoorViews = 0.1;
-// With 277, two of 60 recipients were not traced whose cells were pasted from three copies.
-constexpr double kLeastCells = 300;
+// Of 60 recipients whose cells were pasted from three copies, two were not traced with 277, one with 323.
+constexpr double kLeastCells = 400;
 constexpr Index kFineForProof = 40;  // cells per axis beyond which only the message makes them finer
 
 std::vector<nerf::Camera> cameras_of(const nerf::CameraSpan& span, const EmbedViewOptions& options,

@@ -165,7 +165,8 @@ void Embedder::restore_more(const SafetensorsFile& file) {
   if (file.has("key") != owner_.key.has_value())
     throw IoError(file.path + ": expected a checkpoint " +
                   (owner_.key ? "with a key, found one without" : "without a key, found one with a key"));
-  if (owner_.key && key_from_bytes(file.u8("key")) != *owner_.key)
+  if (owner_.key &&
+      file.u8("key") != std::vector<std::uint8_t>(owner_.key->bytes.begin(), owner_.key->bytes.end()))
     throw IoError(file.path + ": expected a checkpoint under this key, found one under another");
 }
 

@@ -66,7 +66,7 @@ double cells_shown(const CachedView& view, Index side);
 double cells_shown(std::span<const CachedView> views, Index side);
 
 /// Returns the cells per axis at which one view shows the whole message: the least of 16, 22, 28 ... 64 at
-/// which cells_shown() is at least two per bit, or 64 if none is; and at least 300, up to 40 per axis. Fewer
+/// which cells_shown() is at least two per bit, or 64 if none is; and at least 400, up to 40 per axis. Fewer
 /// cells are easier to recognise; a bit that a view does not show cannot be read from it, and a part of a
 /// view, or one of several pasted copies, shows too few of them to be proven. Where space is contracted,
 /// images are crops of the scene and may be cropped again: at least eight per bit, so that two fifths of an
