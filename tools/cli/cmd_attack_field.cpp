@@ -108,7 +108,7 @@ Command add_attack_field(CommandLine& app) {
                  "contrast_A       factor A, 0 to 10\n"
                  "With other fields of the same sizes:\n"
                  "average_A        (1 - A) FIELD + A OTHER, 0 to 1\n"
-                 "sign_flip_A      FIELD + A (UNMARKED - FIELD), 0 to 4; 2 reverses every sign of the mark\n"
+                 "sign_flip_A      FIELD + A (UNMARKED - FIELD), 0 to 4; 2 reverses the mark's signs\n"
                  "copy_A           FIELD + A (MARKED - UNMARKED), -4 to 4\n"
                  "By training, one at a time:\n"
                  "finetune         continues training with the clean images of --data\n"
