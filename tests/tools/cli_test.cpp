@@ -55,6 +55,13 @@ TEST_CASE("A wrong command or option is answered with the nearest one", "[cli]")
   CHECK(far.err.find("did you mean") == std::string::npos);
 }
 
+TEST_CASE("without_function: an error's text loses the function in brackets that it begins with", "[cli]") {
+  CHECK(cli::without_function("[parse_hex] message: must be hexadecimal") == "message: must be hexadecimal");
+  CHECK(cli::without_function("crop: must be in [0, 1] or so") == "crop: must be in [0, 1] or so");
+  CHECK(cli::without_function("[never closed") == "[never closed");
+  CHECK(cli::without_function("").empty());
+}
+
 TEST_CASE("An option's value out of range or of another kind is a usage error in one line", "[cli]") {
   for (const char* value : {"0", "1025", "two", "-1"}) {
     const auto r = run_command({"gradcheck", "--threads", value});

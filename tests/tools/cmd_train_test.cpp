@@ -1,6 +1,7 @@
 #include <fieldmark/core/files.h>
 #include <fieldmark/imaging/image.h>
 #include <fieldmark/nerf/dataset.h>
+#include <fieldmark/nerf/radiance_field.h>
 #include <fieldmark/nerf/trainer.h>
 #include <fieldmark/watermark/mark/owner.h>
 
@@ -48,6 +49,18 @@ TEST_CASE("train tells that there are no test images, and writes the field", "[t
   REQUIRE(r.code == cli::kOk);
   CHECK_THAT(r.out + r.err, Contains("has no test images, so no PSNR is measured on them"));
   CHECK(nlohmann::json::parse(read_text(folder / "f.json"))["test_psnr"].is_null());
+}
+
+TEST_CASE("train tells that the field is complete if a test image cannot be read", "[train]") {
+  const TemporaryFolder folder;
+  const std::string scene = tiny_scene(folder), out = folder / "f.fm";
+  const auto first = std::filesystem::directory_iterator(std::filesystem::path(scene) / "test")->path();
+  write_file_atomically(first, "not an image");
+  const auto r = run_command({"train", "--data", scene, "--out", out, "--steps", "1"});
+  CHECK(r.code == cli::kFailed);
+  CHECK_THAT(r.err, Contains(out + " is complete, but its test views cannot be measured: ") &&
+                        Contains(first.filename().string()));
+  CHECK_NOTHROW(nerf::RadianceField::load(out));
 }
 
 TEST_CASE("train says what type of scene it sees, and takes another that is asked for", "[train]") {

@@ -66,8 +66,9 @@ TEST_CASE("list_images skips hidden and foreign files and counts them", "[images
   std::filesystem::create_directory(folder / "f");
   CHECK(list_images({folder.path.string()}, context, Videos::read).size() == 5);
   write_file_atomically(folder / "f/x.tiff", "x");
-  CHECK_THROWS_WITH(list_images({(folder / "f").string()}, context),
-                    Contains("found none; skipped 1 files") && Contains("1 .tiff"));
+  CHECK_THROWS_WITH(
+      list_images({(folder / "f").string()}, context),
+      Contains("found none; skipped 1 file that is hidden or not an image") && Contains("1 .tiff"));
 }
 
 TEST_CASE("ReadFaults leaves out what cannot be read, unless that is all", "[images]") {

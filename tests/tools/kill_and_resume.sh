@@ -54,7 +54,8 @@ survives() {
 "$fieldmark" scene --out scene --kind sphere --size 32 --views 8 >scene.log 2>&1
 "$fieldmark" key --out secret.key >key.log 2>&1
 survives train field.fm --data scene --steps 120 --max-megabytes 1
-survives embed owner.fm --field "$field" --key secret.key --bits 4 --cells 6 --reader-size 32 --steps 40 --views 8 \
-  --measured-views 1
+tiny=(--field "$field" --key secret.key --bits 4 --cells 6 --reader-size 32 --steps 40 --views 8 --measured-views 1)
+survives embed owner.fm "${tiny[@]}"
+survives embed keyless.fm "${tiny[@]}" --no-key
 survives bake baked.fm --owner owner.fm --message a --steps 40
 echo "train, embed and bake: interrupted, killed and resumed, the same bytes"

@@ -13,6 +13,7 @@
 #include "cli/cli.h"
 #include "cli/commands.h"
 #include "cli/context.h"
+#include "cli/counted.h"
 #include "cli/h264_clip.h"
 #include "cli/images.h"
 #include "cli/outputs.h"
@@ -115,7 +116,7 @@ int run_distort(const DistortArguments& options, Context& context) {
       if (pass.crf) to = std::make_unique<H264Clip>(*pass.crf);
       std::vector<std::size_t> went;
       for (const std::size_t i : left) {
-        if (guard.interrupted()) throw Interrupted(std::to_string(list.size()) + " images were written");
+        if (guard.interrupted()) throw Interrupted(counted(std::ssize(list), "image") + " written");
         auto image = from ? from->next() : read_undistorted(images[i], value, faults);
         progress.update(++done / all);
         if (!image) continue;

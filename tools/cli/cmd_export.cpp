@@ -12,6 +12,7 @@
 #include "cli/cli.h"
 #include "cli/commands.h"
 #include "cli/context.h"
+#include "cli/counted.h"
 #include "cli/images.h"
 #include "cli/mesh_files.h"
 #include "cli/outputs.h"
@@ -101,8 +102,8 @@ int run_export(const ExportArguments& options, Context& context) {
     export_surface(options, field, context, result);
   result["file_bytes"] = std::filesystem::file_size(options.out);
   context.text() << options.out << ": "
-                 << (result.contains("views") ? result["views"].dump() + " views"
-                                              : result["vertices"].dump() + " points")
+                 << (result.contains("views") ? counted(result["views"], "view")
+                                              : counted(result["vertices"], "point"))
                  << ", " << result["file_bytes"].dump() << " bytes\n";
   context.result(result);
   return kOk;

@@ -46,10 +46,13 @@ std::string certainty(const watermark::BitReading& reading, double fpr) {
   const auto weak = std::ranges::count_if(p_values, [](double bit) { return bit > kWeakBit; });
   char text[300];
   if (p <= fpr)
-    std::snprintf(text, sizeof text,
-                  "READ at a false-positive rate of %g: unmarked images give such bits with p %s\n"
-                  "%lld of %zu bits are weak: by themselves they may be wrong (p above %g)\n",
-                  fpr, rounded_up(p).c_str(), static_cast<long long>(weak), p_values.size(), kWeakBit);
+    std::snprintf(
+        text, sizeof text,
+        "READ at a false-positive rate of %g: unmarked images give such bits with p %s\n"
+        "%lld of %zu bits %s (p above %g)\n",
+        fpr, rounded_up(p).c_str(), static_cast<long long>(weak), p_values.size(),
+        weak == 1 ? "is weak: by itself it may be wrong" : "are weak: by themselves they may be wrong",
+        kWeakBit);
   else
     std::snprintf(
         text, sizeof text,

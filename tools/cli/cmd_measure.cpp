@@ -12,6 +12,7 @@
 #include "cli/code_option.h"
 #include "cli/commands.h"
 #include "cli/context.h"
+#include "cli/counted.h"
 #include "cli/lpips.h"
 #include "cli/measured.h"
 #include "cli/scene_data.h"
@@ -131,7 +132,7 @@ Measured measured_on(const std::string& set, const std::vector<nerf::Camera>& ca
                      const Lpips<float>* lpips, Context& context) {
   const Index bits = subject.owner.options().bits;
   if (options.together > static_cast<Index>(cameras.size()))
-    throw UsageError("--together: there are " + std::to_string(cameras.size()) + " views");
+    throw UsageError("--together: there are only " + counted(std::ssize(cameras), "view"));
   const watermark::PayloadCodec codec(bits);
   const auto code = subject.owner.code();
   PayloadCounts payloads(code, bits, options.together);

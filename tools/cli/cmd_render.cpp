@@ -16,6 +16,7 @@
 #include "cli/cli.h"
 #include "cli/commands.h"
 #include "cli/context.h"
+#include "cli/counted.h"
 #include "cli/depth_map.h"
 #include "cli/images.h"
 #include "cli/outputs.h"
@@ -173,7 +174,7 @@ Written write_views(const RenderArguments& options, const nerf::RadianceField& f
     if (guard.interrupted()) {
       if (options.video()) throw Interrupted("nothing was written");
       output.finish();
-      throw Interrupted(std::to_string(done) + " views were written");
+      throw Interrupted(counted(std::ssize(written.images), "view") + " written");
     }
     const double begin = context.seconds();
     auto rendering = renderer.render(camera);
@@ -212,9 +213,9 @@ int run_render(const RenderArguments& options, Context& context) {
   const Written written = write_views(options, field, renderer, cameras, output, context);
   if (!options.sheet.empty()) write_sheet(options, renderer, cameras);
   const double each = written.seconds / static_cast<double>(cameras.size());
-  char line[80];
-  std::snprintf(line, sizeof line, "%zu views, %.3f s each", cameras.size(), each);
-  context.text() << options.out << ": " << line << "\n";
+  char time[40];
+  std::snprintf(time, sizeof time, ", %.3f s each", each);
+  context.text() << options.out << ": " << counted(std::ssize(cameras), "view") << time << "\n";
   Json result = {{"views", cameras.size()},
                  {"width", first.width},
                  {"height", first.height},

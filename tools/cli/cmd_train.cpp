@@ -164,6 +164,13 @@ nerf::Evaluation evaluated(const nerf::RadianceField& field, const nerf::Dataset
   return evaluation;
 }
 
+// Loads the test views of a field that is already saved.
+nerf::Dataset test_views(const TrainArguments& options, const nerf::Dataset& train, Context& context) try {
+  return load_scene(options.data, other_split(options, train, "test"), context);
+} catch (const Error& e) {
+  throw Error(options.out + " is complete, but its test views cannot be measured: " + e.what());
+}
+
 // @param surveyed  the training views, none of which should be a test view
 TestScores test_scores(const TrainArguments& options, const nerf::RadianceField& field,
                        const nerf::Dataset& train, const std::vector<nerf::SurveyedView>& surveyed,
@@ -172,7 +179,7 @@ TestScores test_scores(const TrainArguments& options, const nerf::RadianceField&
     context.note(options.data + " has no test images, so no PSNR is measured on them");
     return {};
   }
-  auto data = load_scene(options.data, other_split(options, train, "test"), context);
+  auto data = test_views(options, train, context);
   warn_of(nerf::twins(surveyed, nerf::survey_views(data)), warnings, context);
   const nerf::Evaluation plain = evaluated(field, data, context);
   TestScores scores{.psnr = plain.psnr,

@@ -13,6 +13,7 @@
 #include "cli/code_option.h"
 #include "cli/commands.h"
 #include "cli/context.h"
+#include "cli/counted.h"
 #include "cli/evidence_run.h"
 #include "cli/rounded_up.h"
 
@@ -48,15 +49,16 @@ void print_verdict(const watermark::EvidenceRecord& record, Context& context) {
   char head[120], text[400];
   std::snprintf(head, sizeof head, "%s at a false-positive rate of %g\n",
                 record.found() ? "FOUND: the images carry a mark of this key," : "NOT FOUND", record.fpr);
-  std::snprintf(text, sizeof text,
-                "p-value of the key    %s (two-sided %s), from %zu images together\n"
-                "p-value of the bits   %s (two-sided %s), %lld of %lld match\n"
-                "detection             %s\n",
-                rounded_up(score.p_value, 3).c_str(), rounded_up(score.p_value_two_sided, 3).c_str(),
-                record.images.size(), rounded_up(score.p_value_bits, 3).c_str(),
-                rounded_up(score.p_value_bits_two_sided, 3).c_str(),
-                static_cast<long long>(score.match.matching), static_cast<long long>(score.match.bits),
-                record.reading.c_str());
+  std::snprintf(
+      text, sizeof text,
+      "p-value of the key    %s (two-sided %s), from %s\n"
+      "p-value of the bits   %s (two-sided %s), %lld of %lld match\n"
+      "detection             %s\n",
+      rounded_up(score.p_value, 3).c_str(), rounded_up(score.p_value_two_sided, 3).c_str(),
+      (counted(std::ssize(record.images), "image") + (record.images.size() > 1 ? " together" : "")).c_str(),
+      rounded_up(score.p_value_bits, 3).c_str(), rounded_up(score.p_value_bits_two_sided, 3).c_str(),
+      static_cast<long long>(score.match.matching), static_cast<long long>(score.match.bits),
+      record.reading.c_str());
   context.text() << head << verdict_sentence(score.p_value, record.fpr) << "\n"
                  << text << "owner sha256 " << record.owner_sha256 << "\ncommitment " << record.commitment
                  << "\n";

@@ -12,6 +12,7 @@
 #include <map>
 
 #include "cli/context.h"
+#include "cli/counted.h"
 
 namespace fieldmark::cli {
 namespace {
@@ -61,8 +62,11 @@ std::string skipped(const Listing& listing) {
     count += files;
     kinds += (kinds.empty() ? "" : ", ") + std::to_string(files) + " " + kind;
   }
-  return count == 0 ? ""
-                    : "skipped " + std::to_string(count) + " files that are hidden or not images: " + kinds;
+  return count == 0
+             ? ""
+             : "skipped " + counted(static_cast<std::int64_t>(count), "file") +
+                   (count == 1 ? " that is hidden or not an image: " : " that are hidden or not images: ") +
+                   kinds;
 }
 
 }  // namespace

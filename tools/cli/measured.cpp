@@ -5,6 +5,7 @@
 #include <ostream>
 
 #include "cli/cli.h"
+#include "cli/counted.h"
 
 namespace fieldmark::cli {
 
@@ -60,8 +61,8 @@ void print_measurement(std::ostream& out, const watermark::Measurement& m, const
     std::snprintf(line, sizeof line, format, values...);
     out << line;
   };
-  print("%lld bits, %lld views of %s cameras, %s\n", static_cast<long long>(m.bits),
-        static_cast<long long>(m.views), cameras.c_str(), m.baked ? "baked field" : "not baked");
+  print("%s, %s of %s cameras, %s\n", counted(m.bits, "bit").c_str(), counted(m.views, "view").c_str(),
+        cameras.c_str(), m.baked ? "baked field" : "not baked");
   if (std::isfinite(m.psnr_base))
     print("against unmarked     %.2f dB, foreground %.2f dB, ssim %.4f\n", m.psnr_base,
           m.psnr_base_foreground, m.ssim_base);
@@ -71,9 +72,8 @@ void print_measurement(std::ostream& out, const watermark::Measurement& m, const
   print("bit accuracy, blind  %.2f%% per view, 5th percentile %.2f%%, %.3f s per view\n",
         100 * m.accuracy.blind, 100 * m.accuracy_p5, m.blind_seconds);
   if (m.informed_views > 0)
-    print("informed             %.2f%%, chosen %.2f%%, of %lld views, %.3f s per view\n",
-          100 * m.accuracy.informed, 100 * m.accuracy.chosen, static_cast<long long>(m.informed_views),
-          m.informed_seconds);
+    print("informed             %.2f%%, chosen %.2f%%, of %s, %.3f s per view\n", 100 * m.accuracy.informed,
+          100 * m.accuracy.chosen, counted(m.informed_views, "view").c_str(), m.informed_seconds);
   if (std::isfinite(m.accuracy.found))
     print("found at p %.0e     %.1f%% of single views\n", watermark::kFoundAt, 100 * m.accuracy.found);
   for (const auto& [name, accuracy] : m.under) {
