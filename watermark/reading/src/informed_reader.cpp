@@ -6,6 +6,7 @@
 #include "best_alignment.h"
 #include "camera_search.h"
 #include "evidence_view.h"
+#include "mirror_choice.h"
 #include "plain_border.h"
 #include "pose_alignment.h"
 #include "residual_signs.h"
@@ -20,7 +21,6 @@ namespace {
 
 constexpr Index kByPlaces = 3, kByImage = 3, kByPart = 6;  // candidate cameras
 constexpr AlignmentStage kCoarse[] = {{.size = 48, .blur = 1.5, .steps = 6, .quick = true}};
-constexpr double kSure = 0.95;   // agreement: a symmetric object agrees with its mirror image, but seldom so well
 constexpr Index kFewViews = 64;  // tried first: they suffice for most images, at a seventh of the time
 constexpr double kStretches[] = {1.5, 1 / 1.5, 1.25, 0.8};  // of the width
 constexpr AlignmentStage kCoarseStretched[] = {
@@ -245,8 +245,9 @@ Surround InformedReader::cleared(const Tensor<float>& whole) const {
 ImageReading InformedReader::read(const Tensor<float>& image, double least) {
   const Tensor<float> whole = opaque_image(image, nerf::background_value(owner_.field.background));
   ImageReading best = read_as(whole, {}, least);
-  if (best.informed.agreement >= kSure) return best;
-  for (const Change& change : changes(cleared(whole).image)) {
+  const double agreement = best.informed.agreement;
+  if (!is_side_doubtful(agreement, owner_.field.space.kind)) return best;
+  for (const Change& change : changes(cleared(whole).image, agreement < kSure)) {
     ImageReading changed = read_as(change.mirrored ? mirrored(whole) : whole, change, kLeastAgreement);
     if (changed.chosen == ReadingKind::informed && changed.informed.agreement > best.informed.agreement)
       best = std::move(changed);
@@ -294,10 +295,11 @@ ImageReading InformedReader::read_near(const Tensor<float>& image, const nerf::C
   return reading;
 }
 
-// Returns changes to try: a mirror, and the stretch that makes the image look most like the field, if any
-// makes it look more like it than no stretch.
-std::vector<InformedReader::Change> InformedReader::changes(const Tensor<float>& seen) {
+// Returns changes to try: a mirror, and on request the stretch that makes the image look most like the field,
+// if any makes it look more like it than no stretch.
+std::vector<InformedReader::Change> InformedReader::changes(const Tensor<float>& seen, bool stretches) {
   std::vector<Change> changes{{.mirrored = true}};
+  if (!stretches) return changes;
   const CameraSearch& search = all_views();
   double most = search.likeness(seen), stretch = 1;
   for (const double tried : kStretches) {

@@ -52,8 +52,9 @@ class CameraSearch;
 ///   - Candidate cameras are aligned coarsely, the best of them finely; the best agreement wins. The first
 ///     candidates come from 64 renders. A fine alignment that agrees by less than 0.5 at 96 pixels ends
 ///     there. Below an agreement of 0.95, the search goes on with all renders, then with the mirrored image
-///     and with one stretched to where it looks most like the field. Before evidence is taken, the camera of
-///     a thin object is aligned once more, at 400 pixels; the agreement stays that at 200.
+///     and with one stretched to where it looks most like the field. An object is tried mirrored below 0.975,
+///     for it may be nearly symmetric. Before evidence is taken, the camera of a thin object is aligned once
+///     more, at 400 pixels; the agreement stays that at 200.
 ///   - The image is reduced to 512 pixels on the longer side. Unless it shows JPEG quantisation, it is then
 ///     reduced to about 48,000 pixels that show the field.
 ///   - The blur that leaves the smallest residual is kept, and a change of colour is fitted. Of a JPEG image,
@@ -79,8 +80,8 @@ class InformedReader {
   ImageReading read(const Tensor<float>& image, double least = -1);
   /// Reads a part of an image that shows an object before anything, from a guess of its camera: pixels
   /// outside the object's outline do not count, neither for the alignment nor for the evidence. Chooses
-  /// informed, or leaves the evidence of both detectors empty if the agreement is below `least` or 0.8. Before
-  /// evidence is taken, the camera is aligned once more; the agreement stays that before.
+  /// informed, or leaves the evidence of both detectors empty if the agreement is below `least` or 0.8.
+  /// Before evidence is taken, the camera is aligned once more; the agreement stays that before.
   /// @param image  [H, W, 3], sides of at least 16   @param start  of its size; the object must be within a
   /// few hundredths of its size of where it shows it   @param covered  [H W] 1 where something else covers
   /// the view, or empty   @throws ShapeError if the sizes differ or are below 16
@@ -96,7 +97,7 @@ class InformedReader {
   struct Parts;
   struct Change;
   const CameraSearch& all_views();
-  std::vector<Change> changes(const Tensor<float>& seen);
+  std::vector<Change> changes(const Tensor<float>& seen, bool stretches);
   static constexpr double kNeverEnough = std::numeric_limits<double>::infinity();
   static std::vector<nerf::Camera> lookalikes(const CameraSearch& search, const Tensor<float>& image,
                                               const Change& change);
