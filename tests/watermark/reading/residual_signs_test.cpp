@@ -8,6 +8,7 @@
 
 #include "blurred.h"
 #include "support/catch.h"
+#include "support/random.h"
 #include "watermark/tiny_owner.h"
 
 using namespace fieldmark;
@@ -48,6 +49,21 @@ TEST_CASE("residual_signs: the residual shows the signs that were sent, in chang
   CHECK(share_of(owner, signs_of(owner, {.image = image, .plain = {}}, camera).sign) > 0.5);
   for (float& x : image.data) x = 0.7f * x + 0.1f;
   CHECK(share_of(owner, signs_of(owner, {.image = image, .plain = {}}, camera).sign) > 0.5);
+}
+
+TEST_CASE("residual_signs: noise of lightness hides less than as much noise in every channel") {
+  const Owner owner = marking_owner();
+  const nerf::Camera camera = residual_camera(96);
+  const auto share = [&](bool grey) {
+    Tensor<float> image = marked_image(owner, camera);
+    const auto noise = uniform<float>({image.size()}, -0.8f, 0.8f, 5);
+    for (Index i = 0; i < image.size(); ++i) image[i] += noise[grey ? i / 3 : i];
+    return share_of(owner, signs_of(owner, {.image = image, .plain = {}}, camera).sign);
+  };
+  const double of_grey = share(true), of_colour = share(false);
+  CAPTURE(of_grey, of_colour);
+  CHECK(of_grey > 0.4);
+  CHECK(of_grey > 1.5 * of_colour);
 }
 
 TEST_CASE("residual_signs: cells behind covered pixels have no sign") {

@@ -128,6 +128,15 @@ TEST_CASE("sign_fit: a cell that is seen through a stronger one keeps its sign")
   CHECK(alone < 20);
 }
 
+TEST_CASE("sign_fit: the signs explain a residual that is the mark, and little of one that is noise") {
+  const Carriers c = overlapping(0);
+  const double clear = fit_signs(c, score_of(c, 1e-4), kCells).explained,
+               hidden = fit_signs(c, score_of(c, 1), kCells).explained;
+  CAPTURE(clear, hidden);
+  CHECK((clear > 0.5 && clear < 1.001));  // lambda takes a part of the mark for noise
+  CHECK((hidden >= 0 && hidden < 0.1));
+}
+
 TEST_CASE("sign_fit: noise that is alike from pixel to pixel counts for what it is") {
   const Carriers c = overlapping(0);
   const MarkScore rough = score_of(c, 1);

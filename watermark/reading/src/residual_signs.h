@@ -19,6 +19,8 @@ struct ResidualSigns {
 ///     the field's background and over the image's.
 ///   - With the residual R and its mean power V around each pixel, R / V is the score and 1 / V the
 ///     precision. For a JPEG image both come from the quantised coefficients.
+///   - If the signs explain less than a tenth of the residual, which then is mostly noise, they are estimated
+///     again along axes of colour in which the residual is uncorrelated, see uncorrelated_axes().
 ///   - Covered pixels do not count; in a JPEG image, neither do the blocks of 16 x 16 pixels around them.
 /// @param renderer  of the owner's field   @throws ShapeError if the sizes of image and camera differ
 ResidualSigns residual_signs(nerf::Renderer& renderer, const Owner& owner, const EvidenceView& image);

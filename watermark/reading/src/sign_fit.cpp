@@ -59,6 +59,15 @@ class Fit {
     return v;
   }
 
+  // The weighted power of the residual, g^2 / W.
+  double power() const {
+    return ordered_sum(pixels(), 0.0, [&](Index begin, Index end, double& sum) {
+      for (Index i = 3 * begin; i < 3 * end; ++i)
+        if (counted(i / 3) > 0 && score_.precision[i] > 0)
+          sum += static_cast<double>(score_.score[i] * score_.score[i] / score_.precision[i]);
+    });
+  }
+
   double noise() const {
     double found = 0, expected = 0;
     for (const auto& [down, right] : kElsewhere) {
@@ -137,7 +146,8 @@ SignFit fit_signs(const Carriers& mark, const MarkScore& score, Index cells) {
                      " pixels");
   const Fit fit(mark, score, cells);
   SignFit out{Values(at(cells)), fit.noise()};
-  Values rest = fit.onto_cells(fit.counted_score()), way = rest;
+  const Values slope = fit.onto_cells(fit.counted_score());
+  Values rest = slope, way = rest;
   const double first = dot(rest, rest);
   double square = first;
   for (int step = 0; step < kSteps && square > kRest * kRest * first; ++step) {
@@ -154,6 +164,8 @@ SignFit fit_signs(const Carriers& mark, const MarkScore& score, Index cells) {
     for (std::size_t c = 0; c < moved.size(); ++c) way[c] = rest[c] + next / square * way[c];
     square = next;
   }
+  const double power = fit.power();
+  out.explained = power > 0 ? dot(slope, out.sign) / power : 0;
   for (double& s : out.sign) s = std::clamp(s, -1.0, 1.0);
   return out;
 }

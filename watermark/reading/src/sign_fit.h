@@ -3,7 +3,7 @@
 
 namespace fieldmark::watermark {
 
-/// Likelihood of a mark in an image, per pixel of the foreground.
+/// Likelihood of a mark in an image, per pixel of the foreground, along the axes of colour of the carriers.
 struct MarkScore {
   Tensor<float> score;            ///< [H, W, 3] slope of the log-likelihood in the mark's change
   Tensor<float> precision;        ///< [H, W, 3] inverse variance of the noise, >= 0
@@ -15,6 +15,7 @@ struct MarkScore {
 struct SignFit {
   std::vector<double> sign;  ///< [cells] in [-1, 1]; 0 for a hidden cell
   double noise = 0;          ///< lambda, see fit_signs()
+  double explained = 0;      ///< share of g^2 / W, the weighted power of the residual, that the signs explain
 };
 
 /// Estimates the signs of all cells jointly, since a pixel shows several. With M_c the blurred carrier of

@@ -61,7 +61,8 @@ class CameraSearch;
 ///     the likeliest of the renders with and without either is kept, over the field's background and over
 ///     the image's.
 ///   - With the residual R and its power V around each pixel, R / V is the score and 1 / V the precision.
-///     For a JPEG image both come from the quantised coefficients.
+///     For a JPEG image both come from the quantised coefficients. If the mark explains less than a tenth of
+///     R, colours are turned to axes along which R is uncorrelated: noise is mostly of lightness.
 ///   - S_c are the signs that explain the whole residual by linear least squares, since a ray passes several
 ///     cells. Where JPEG, blur or downscaling took detail from the image, the blind evidence is added at
 ///     equal power: the extractor reads more there. Its weight is the correlation of the two after JPEG, and
